@@ -37,8 +37,8 @@ def sweep_parameters(
     """
     import msgspec
 
+    from crosscheck.sampling.outputs import summarise
     from crosscheck.sampling.run import SUMMARY, run_sweep
-    from crosscheck.sampling.statistics import summarise
     from crosscheck.terminal.many_runs import print_summary, sampling_bar
 
     common.check_limit(time_limit)

@@ -27,6 +27,11 @@ class Event:
     kind: Literal["started", "emitted", "ended", "crashed", "stopped"]
     content: Any = None
 
+    @property
+    def status_of_end(self) -> Literal["crashed", "did not finish"]:
+        """The status of a job that crashed or was stopped."""
+        return "crashed" if self.kind == "crashed" else "did not finish"
+
 
 @dataclass(frozen=True)
 class Limits:

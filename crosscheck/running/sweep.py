@@ -67,7 +67,7 @@ def run_planned(
         replace(job, done=_done(known, job), expected_s=took.get(job.work)) for _, planned in plans for job in planned
     ]
     work = Work(
-        execute, jobs, str(records.with_suffix(".log")), limits.workers, _engine, _time_limit, limits.memory_bytes
+        execute, jobs, str(records.with_suffix(".log")), limits.workers, library, _time_limit, limits.memory_bytes
     )
     doing: dict[int, str] = {}
     with (
@@ -89,7 +89,7 @@ def run_planned(
             listener(jobs, event)
 
 
-def _engine(job: Job) -> str:
+def library(job: Job) -> str:
     """The kind of a job: a worker serves one library, so that it is loaded and its kernels are compiled once."""
     return SERVED_WITH.get(job.engine, job.engine)
 
@@ -118,5 +118,4 @@ def _done(known: Sequence[Record], job: Job) -> frozenset[Done]:
 
 
 def _cut_short(job: Job, event: Event) -> RunRecord:
-    status = "crashed" if event.kind == "crashed" else "did not finish"
-    return msgspec.structs.replace(job.blank, status=status, message=clean(event.content))
+    return msgspec.structs.replace(job.blank, status=event.status_of_end, message=clean(event.content))

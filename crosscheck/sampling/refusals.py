@@ -15,8 +15,8 @@ from crosscheck.engines.registry import NoSuchEngine, find_engine
 from crosscheck.library.case import CaseError
 from crosscheck.library.channels import part_of
 from crosscheck.sampling.file import SampleEffort, SweepFile, SweptQuantity
-from crosscheck.sampling.quantities import LETTERS, place_of
-from crosscheck.sampling.scenes import require_numbers
+from crosscheck.sampling.sample import LETTERS, place_of
+from crosscheck.sampling.values import require_numbers
 from flexmb.integrate.integrator import Method
 from flexmb.scene.problems import Defect, Place, closest
 from flexmb.scene.schema import Scene

@@ -13,7 +13,7 @@ import numpy as np
 
 from crosscheck.engines.answers import clean
 from crosscheck.engines.contract import Effort
-from crosscheck.engines.registry import PROVIDER, SERVED_WITH, home
+from crosscheck.engines.registry import PROVIDER, home
 from crosscheck.library.case import CaseError, Variant
 from crosscheck.library.find import resolve
 from crosscheck.records.archive import Archive, decoded_lines
@@ -24,11 +24,12 @@ from crosscheck.running.job import MAIN, Done, Job
 from crosscheck.running.plan import sample_times, scene_identity
 from crosscheck.running.pool import run_jobs
 from crosscheck.running.scheduler import BY_DEFAULT, TIME_LIMIT_S, Event, Limits, Scheduler, Work
+from crosscheck.running.sweep import library
 from crosscheck.sampling.file import SweepFile, load_sweep
-from crosscheck.sampling.points import sample_values
+from crosscheck.sampling.outputs import samples_table
 from crosscheck.sampling.refusals import require_sense
-from crosscheck.sampling.sample import SampleJob, SampleRecord, Written, run_sample
-from crosscheck.sampling.table import SamplesTable
+from crosscheck.sampling.sample import Sampled, SampleJob, SampleRecord, Written, run_sample
+from crosscheck.sampling.values import sample_values
 from flexmb.output.whole import take_away
 from flexmb.output.writing import in_words
 from flexmb.scene.files import load_scene
@@ -37,7 +38,7 @@ from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
 RECORDS, TABLE, SUMMARY = "samples.jsonl", "samples.csv", "summary.json"
-REDUCING = ("crosscheck.sampling.quantities",)
+REDUCING = ("crosscheck.sampling.sample",)
 Listener = Callable[[int, int, int], None]  # numbers of samples: done, all, without result
 
 
@@ -48,14 +49,6 @@ class Subject:
     base: Scene
     variant: Variant
     times: Real
-
-
-@dataclass(frozen=True)
-class Sampled:
-    """A sweep that was run: the outcome of every sample in every engine, in order."""
-
-    sweep: SweepFile
-    records: tuple[SampleRecord, ...]
 
 
 def run_sweep(
@@ -90,12 +83,14 @@ def run_sweep(
         records.unlink(missing_ok=True)
     known = _known(records)
     jobs = _jobs(sweep, subject, values, known, provider, limits.time_s or TIME_LIMIT_S)
-    log = str(out / "samples.log")
-    work = Work(run_sample, jobs, log, limits.workers, _kind, _time_limit, limits.memory_bytes)
+    work = Work(
+        run_sample, jobs, str(out / "samples.log"), limits.workers, lambda sample: library(sample.job),
+        lambda sample: sample.job.time_limit_s, limits.memory_bytes,
+    )  # fmt: skip
     used: dict[int, SampleRecord] = {}
     with (
         closing(Archive(records, Written)) as archive,
-        SamplesTable(out / TABLE, sweep) as table,
+        samples_table(out / TABLE, sweep) as add,
         closing(scheduler(work)) as events,
     ):
         archive.write(environment())
@@ -105,7 +100,7 @@ def run_sweep(
                 continue
             if not isinstance(event.content, Confirmed):
                 archive.write(record)
-            table.add(record)
+            add(record)
             used[event.job] = record
             listener(len(used), len(jobs), sum(each.status != "finished" for each in used.values()))
     return Sampled(sweep, tuple(used.get(number, job.blank) for number, job in enumerate(jobs)))
@@ -140,7 +135,7 @@ def _jobs(
     base = _digest(scene_identity(subject.base, subject.times), msgspec.json.encode(subject.variant), what)
     kept = tuple(quantity.channel for quantity in sweep.quantities)
     engines = [(engine, home(engine), _effort(sweep, engine)) for engine in sweep.engines]  # plug-ins are looked for
-    found = []
+    jobs = []
     for sample, row in enumerate(values):
         scene_id = _digest(base, row.tolist())
         for engine, maker, efforts in engines:
@@ -150,8 +145,8 @@ def _jobs(
                 times=subject.times, provider=provider, maker=maker, efforts=efforts, finest_only=True, kept=kept,
                 done=_done(done), time_limit_s=time_limit_s, lean=True,
             )  # fmt: skip
-            found.append(SampleJob(job, sample, tuple(row.tolist()), sweep, subject.base, subject.variant, asked))
-    return found
+            jobs.append(SampleJob(job, sample, tuple(row.tolist()), sweep, subject.base, subject.variant, asked))
+    return jobs
 
 
 def _effort(sweep: SweepFile, engine: str) -> tuple[Effort, ...]:
@@ -160,10 +155,8 @@ def _effort(sweep: SweepFile, engine: str) -> tuple[Effort, ...]:
 
 def _known(records: Path) -> dict[tuple[str, ...], SampleRecord]:
     """The latest recorded outcome by engine, scene and quantities."""
-    found = decoded_lines(records, Written) if records.exists() else []
-    return {
-        (record.engine, record.scene, record.asked): record for record in found if isinstance(record, SampleRecord)
-    }
+    lines = decoded_lines(records, Written) if records.exists() else []
+    return {(line.engine, line.scene, line.asked): line for line in lines if isinstance(line, SampleRecord)}
 
 
 def _done(record: SampleRecord | None) -> frozenset[Done]:
@@ -173,9 +166,7 @@ def _done(record: SampleRecord | None) -> frozenset[Done]:
     return frozenset((Done(record.effort, record.made_by, record.rungs - 1, record.rungs),))
 
 
-def _outcome(
-    job: SampleJob, event: Event, known: dict[tuple[str, ...], SampleRecord]
-) -> SampleRecord | None:
+def _outcome(job: SampleJob, event: Event, known: dict[tuple[str, ...], SampleRecord]) -> SampleRecord | None:
     """The record of a sample, if the event is its outcome."""
     if isinstance(event.content, SampleRecord):
         return event.content
@@ -183,18 +174,8 @@ def _outcome(
         record = known[job.job.engine, job.job.scene_id, job.asked]
         return msgspec.structs.replace(record, sample=job.sample, parameters=job.blank.parameters)
     if event.kind in ("crashed", "stopped"):
-        status = "crashed" if event.kind == "crashed" else "did not finish"
-        return msgspec.structs.replace(job.blank, status=status, message=clean(event.content))
+        return msgspec.structs.replace(job.blank, status=event.status_of_end, message=clean(event.content))
     return None
-
-
-def _kind(job: SampleJob) -> str:
-    """The kind of a job: a worker serves one library."""
-    return SERVED_WITH.get(job.job.engine, job.job.engine)
-
-
-def _time_limit(job: SampleJob) -> float:
-    return job.job.time_limit_s
 
 
 def _digest(*parts: object) -> str:

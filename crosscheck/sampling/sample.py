@@ -1,12 +1,13 @@
-"""The job of one sample: its scene is made, run by one engine, and reduced to the quantities."""
+"""The job of one sample: its scene is made, run by one engine, and reduced over time to the quantities."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import msgspec
+import numpy as np
 
 from crosscheck.library.case import Variant
 from crosscheck.records.kinds import BrokenLine, Confirmed, Environment, RunStatus
@@ -14,11 +15,11 @@ from crosscheck.running.execute import solve_job
 from crosscheck.running.job import Job
 from crosscheck.running.plan import variant_scene
 from crosscheck.running.rung import Solved
-from crosscheck.sampling.file import SweepFile
-from crosscheck.sampling.quantities import reduce
-from crosscheck.sampling.scenes import with_values
+from crosscheck.sampling.file import Reduction, SweepFile, SweptQuantity
+from crosscheck.sampling.values import with_values
 from flexmb.scene.check import check_scene
 from flexmb.scene.schema import Scene
+from flexmb.typing import Real
 
 
 class SampleRecord(
@@ -72,14 +73,22 @@ class SampleJob:
         )  # fmt: skip
 
 
+@dataclass(frozen=True)
+class Sampled:
+    """A sweep that was run: the outcome of every sample in every engine, in order."""
+
+    sweep: SweepFile
+    records: tuple[SampleRecord, ...]
+
+
 def run_sample(sample: SampleJob, emit: Callable[[Any], None]) -> None:
     """The function of a worker: emits a SampleRecord, or a Confirmed if the recorded one is valid."""
 
-    def reduced(found: Solved | Confirmed | str) -> None:
-        if isinstance(found, Solved):
-            emit(_reduced(sample, found))
-        elif isinstance(found, Confirmed):
-            emit(found)
+    def reduced(content: Solved | Confirmed | str) -> None:
+        if isinstance(content, Solved):
+            emit(_reduced(sample, content))
+        elif isinstance(content, Confirmed):
+            emit(content)
 
     solve_job(_with_scene(sample), reduced)
 
@@ -103,7 +112,48 @@ def _reduced(sample: SampleJob, solved: Solved) -> SampleRecord:
     if run.status != "finished":
         return record
     try:
-        found = {quantity.name: reduce(quantity, solved.channels) for quantity in sample.sweep.quantities}
+        quantities = {quantity.name: reduce(quantity, solved.channels) for quantity in sample.sweep.quantities}
     except ValueError as error:
         return msgspec.structs.replace(record, status="failed", message=str(error))
-    return msgspec.structs.replace(record, quantities=found)
+    return msgspec.structs.replace(record, quantities=quantities)
+
+
+LETTERS = {3: "xyz", 4: "wxyz"}  # of the components of a vector and of a quaternion
+REDUCTIONS: dict[Reduction, Callable[[Real], float]] = {
+    "final": lambda signal: signal[-1],
+    "initial": lambda signal: signal[0],
+    "minimum": np.min,
+    "maximum": np.max,
+    "range": np.ptp,
+    "mean": np.mean,  # of the samples, which are equally spaced
+    "largest": lambda signal: np.max(np.abs(signal)),
+}
+
+
+def reduce(quantity: SweptQuantity, channels: Mapping[str, Real]) -> float:
+    """The quantity of a run with these channels (T, k); ValueError says what is missing, or is not finite."""
+    if quantity.channel not in channels:
+        raise ValueError(f'{quantity.name}: the engine gives no channel "{quantity.channel}"')
+    number = float(REDUCTIONS[quantity.value](_signal(quantity, channels[quantity.channel])))
+    if not np.isfinite(number):
+        raise ValueError(f"{quantity.name} is {number}")
+    return number
+
+
+def _signal(quantity: SweptQuantity, values: Real) -> Real:
+    """One component (T,), the only one, or the norm of all."""
+    width, component = values.shape[1], quantity.component
+    if component is None:
+        return values[:, 0] if width == 1 else np.linalg.norm(values, axis=1)
+    place = place_of(component, width)
+    if place is None:
+        raise ValueError(f"{quantity.name}: {quantity.channel} has {width} components, none is {component!r}")
+    return values[:, place]
+
+
+def place_of(component: int | str, width: int) -> int | None:
+    """The column of a component in a channel of some width, None if it has no such component."""
+    if isinstance(component, int):
+        return component if 0 <= component < width else None
+    letters = LETTERS.get(width, "")
+    return letters.index(component) if len(component) == 1 and component in letters else None

@@ -12,7 +12,7 @@ from rich.progress import TimeRemainingColumn
 from rich.text import Text
 
 from crosscheck.running.scheduler import Limits, Scheduler
-from crosscheck.sampling.statistics import Distribution, Estimated, SweepSummary
+from crosscheck.sampling.outputs import Distribution, Estimated, SweepSummary
 from crosscheck.stability.map import StabilityMap
 from crosscheck.stability.picture import draw
 from crosscheck.stability.run import Finished, run_map

@@ -109,8 +109,7 @@ class LiveProgress:
     def _ending(self, title: str, event: Event) -> Text:
         """The lasting line of a job."""
         if event.kind in ("crashed", "stopped"):
-            status = "crashed" if event.kind == "crashed" else "did not finish"
-            return _ending_line(status, f"{title}: {status}: {event.content}")
+            return _ending_line(event.status_of_end, f"{title}: {event.status_of_end}: {event.content}")
         records, spent = self._records[event.job], time.perf_counter() - self._started[event.job]
         if not records:
             return _ending_line("finished", f"{title}: already recorded")

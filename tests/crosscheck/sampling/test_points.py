@@ -7,12 +7,10 @@ import pytest
 
 from crosscheck.library.case import CaseError
 from crosscheck.sampling.file import LogNormal, Normal, SweepFile, SweptQuantity, Triangular, Uniform, Values
-from crosscheck.sampling.points import sample_values
-from crosscheck.sampling.quantities import reduce
+from crosscheck.sampling.outputs import summarise
 from crosscheck.sampling.run import Sampled
-from crosscheck.sampling.sample import SampleRecord
-from crosscheck.sampling.scenes import with_values
-from crosscheck.sampling.statistics import summarise
+from crosscheck.sampling.sample import SampleRecord, reduce
+from crosscheck.sampling.values import sample_values, with_values
 from flexmb import SceneBuilder
 from flexmb.scene.shapes import beam_section
 

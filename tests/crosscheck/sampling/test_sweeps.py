@@ -15,8 +15,8 @@ from crosscheck import cli
 from crosscheck.library.case import CaseError
 from crosscheck.running.pool import run_jobs
 from crosscheck.running.scheduler import Event, Limits, Work
+from crosscheck.sampling.outputs import summarise
 from crosscheck.sampling.run import Sampled, run_sweep
-from crosscheck.sampling.statistics import summarise
 from flexmb.scene.files import dumps
 from tests.crosscheck.sessions import CASE, PROVIDER
 from tests.flexmb.scene.bad_scenes import satellite

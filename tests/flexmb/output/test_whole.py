@@ -28,7 +28,7 @@ APART = {
     "crosscheck/records/archive.py": "appends lines, a torn one is cut off; what it rewrites is whole",
     "crosscheck/records/lock.py": "who holds a lock: of use to nobody after a kill",
     "crosscheck/running/worker.py": "appends to a log",
-    "crosscheck/sampling/table.py": "the table that grows says in its name that it is unfinished",
+    "crosscheck/sampling/outputs.py": "the table that grows says in its name that it is unfinished",
     "crosscheck/library/reference.py": "writes into a text in memory",
 }
 

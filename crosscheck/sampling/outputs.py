@@ -1,17 +1,75 @@
-"""Statistics of a sweep: moments and quantiles with their standard errors, and failures."""
+"""What a sweep leaves behind: the table of its samples, and their statistics with standard errors.
+
+The table has a line for each sample in each engine, appended as they come, sorted at the end. Statistics are moments,
+quantiles and the failures.
+"""
 
 from __future__ import annotations
 
+import csv
 import math
 from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TextIO
 
 import msgspec
 import numpy as np
 
-from crosscheck.sampling.run import Sampled
+from crosscheck.sampling.file import SweepFile
+from crosscheck.sampling.sample import Sampled, SampleRecord
+from flexmb.output.csv_cells import as_text
+from flexmb.output.whole import whole_file
+from flexmb.output.writing import writing
 from flexmb.typing import Real
 
 QUANTILES = (0.05, 0.5, 0.95)
+
+
+@contextmanager
+def samples_table(file: Path, sweep: SweepFile) -> Iterator[Callable[[SampleRecord], None]]:
+    """A function that adds a line to a CSV file: sample, engine, status, parameters, quantities or nothing, message.
+
+    Until the context ends without an error the lines are in `<name>.unfinished.csv`, in the order in which they came.
+    """
+    growing = file.with_suffix(f".unfinished{file.suffix}")
+    parameters = [parameter.title for parameter in sweep.parameters]
+    quantities = [quantity.name for quantity in sweep.quantities]
+    header = ["sample", "engine", "status", *parameters, *quantities, "message"]
+    lines: dict[tuple[int, str], list[object]] = {}
+    with writing(growing):
+        stream = growing.open("w", encoding="utf-8", newline="")
+
+    def append(line: Sequence[object]) -> None:
+        with writing(growing):
+            _write(stream, line)
+
+    def add(record: SampleRecord) -> None:
+        given = [record.parameters[name] for name in parameters]
+        numbers = [record.quantities.get(name, "") for name in quantities]
+        line = [record.sample, record.engine, record.status, *given, *numbers, record.message]
+        lines[record.sample, record.engine] = line
+        append(line)
+
+    try:
+        append(header)
+        yield add
+    finally:
+        with writing(growing):
+            stream.close()
+    with whole_file(file) as beside, beside.open("w", encoding="utf-8", newline="") as complete:
+        for line in (header, *(lines[key] for key in sorted(lines))):
+            _write(complete, line)
+    growing.unlink()
+
+
+def _write(stream: TextIO, line: Sequence[object]) -> None:
+    """One line: texts are quoted and no formulas, numbers have all their digits."""
+    csv.writer(stream, quoting=csv.QUOTE_NONNUMERIC, lineterminator="\n").writerow(
+        [as_text(cell) if isinstance(cell, str) else cell for cell in line]
+    )
+    stream.flush()
 
 
 class Estimated(msgspec.Struct, frozen=True, kw_only=True):
@@ -73,10 +131,10 @@ def summarise(done: Sampled) -> SweepSummary:
     distributions = []
     for quantity in sweep.quantities:
         for engine in sweep.engines:
-            found = [(each.quantities[quantity.name], each.sample) for each in done.records
-                     if each.engine == engine and each.status == "finished"]  # fmt: skip
-            if found:
-                values, numbers = map(np.array, zip(*found, strict=True))
+            finished = [each for each in done.records if each.engine == engine and each.status == "finished"]
+            if finished:
+                values = np.array([record.quantities[quantity.name] for record in finished])
+                numbers = np.array([record.sample for record in finished])
                 distributions.append(_distribution(quantity.name, engine, values, numbers, sweep.sampling != "grid"))
     failures = [
         Failure(
