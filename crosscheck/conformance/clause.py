@@ -165,9 +165,9 @@ def simplest(engine: Engine, rate: float = 0.4) -> Scene:
 
 
 def snapshot(engine: Engine, scene: Scene) -> Snapshot:
-    found = offered(engine, scene).evaluate()
-    require(isinstance(found, Snapshot), f"evaluate() returned a {type(found).__name__}, not a Snapshot")
-    return found
+    answer = offered(engine, scene).evaluate()
+    require(isinstance(answer, Snapshot), f"evaluate() returned a {type(answer).__name__}, not a Snapshot")
+    return answer
 
 
 def ladder(engine: Engine, scene: Scene, duration_s: float) -> tuple[Effort, ...]:

@@ -188,9 +188,9 @@ def _run(engine: Engine) -> Trajectory:
 
 
 def _start(engine: Engine) -> Snapshot:
-    found = _compiled(engine)[1].evaluate()
-    require(isinstance(found, Snapshot), f"evaluate() returned a {type(found).__name__}, not a Snapshot")
-    return found
+    answer = _compiled(engine)[1].evaluate()
+    require(isinstance(answer, Snapshot), f"evaluate() returned a {type(answer).__name__}, not a Snapshot")
+    return answer
 
 
 def _leave(engine: Engine) -> None:

@@ -199,6 +199,6 @@ def _slope(case: Any, y: Real, along: Real) -> Real:
 
 
 def _unit(n: int, size: int) -> Real:
-    found = np.zeros(size)
-    found[n] = 1.0
-    return found
+    unit = np.zeros(size)
+    unit[n] = 1.0
+    return unit

@@ -169,11 +169,11 @@ def verdict_on(outcomes: list[ClauseOutcome], chosen: bool = False) -> ContractV
 
 def to_offer(outcomes: list[ClauseOutcome]) -> dict[str, list[str]]:
     """For each thing that an engine would have to offer, the clauses that need it."""
-    found: dict[str, list[str]] = {}
+    clauses: dict[str, list[str]] = {}
     for each in outcomes:
         if each.status == "not offered":
-            found.setdefault(each.offer, []).append(each.clause)
-    return found
+            clauses.setdefault(each.offer, []).append(each.clause)
+    return clauses
 
 
 def _first_offer(outcomes: list[ClauseOutcome]) -> str:

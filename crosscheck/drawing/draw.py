@@ -74,17 +74,17 @@ def _rigid(scene: Scene, body: RigidBody, marker: Marker) -> list[Line]:
 
 def _masses(scene: Scene) -> list[Line]:
     """Fixed point masses; moving ones are bodies in a film."""
-    found = []
+    lines = []
     for mass in scene.point_masses:
         point = None if mass.directions else _carried(scene, mass.body, mass.node, mass.offset_m)
         if point is not None:
-            found.append(Line(body=mass.name, kind="ball", points=(point,)))
-    return found
+            lines.append(Line(body=mass.name, kind="ball", points=(point,)))
+    return lines
 
 
 def _connectors(scene: Scene) -> list[Line]:
     """Connectors between nodes, and springs along hinges at the hinge points."""
-    found = []
+    lines = []
     for each in scene.connectors:
         kind, points = "mount", []
         if isinstance(each, BetweenNodes):
@@ -95,8 +95,8 @@ def _connectors(scene: Scene) -> list[Line]:
             points = [_carried(scene, hinge.child, hinge.child_node, hinge.child_position_m) for hinge in hinges]
         seen = tuple(point for point in points if point is not None)
         if seen and len(seen) == len(points):
-            found.append(Line(body=each.name, kind=kind, points=seen))
-    return found
+            lines.append(Line(body=each.name, kind=kind, points=seen))
+    return lines
 
 
 def _carried(scene: Scene, body: str, node: str, offset: Vector) -> CarriedPoint | None:

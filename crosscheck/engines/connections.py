@@ -114,12 +114,12 @@ def connections(scene: Scene, chain: tuple[Link, ...]) -> tuple[Connection, ...]
 def along_hinges(scene: Scene) -> list[tuple[str, str, int, Callable[[float, float, float], Along]]]:
     """For each connector along a hinge: its name, the hinge, wheel or point mass, the number of the coordinate, and the
     load as a function of time, value and rate."""
-    found = []
+    loads = []
     for connector in scene.connectors:
         if isinstance(connector, PeerAlong):
             item, number = coordinate_of(scene, connector)
-            found.append((connector.name, item.name, number, _along(connector)))
-    return found
+            loads.append((connector.name, item.name, number, _along(connector)))
+    return loads
 
 
 def law_of(stems: dict[str, Any]) -> Law:

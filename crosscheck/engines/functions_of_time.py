@@ -89,11 +89,11 @@ def breaks_between(functions: list[Function], first: float, last: float) -> list
 
 def scene_functions(scene: Scene) -> list[Function]:
     """Every function of time in the scene: loads, motors, prescribed motions."""
-    found: list[Function] = []
+    functions: list[Function] = []
 
     def visit(item: object) -> None:
         if isinstance(item, Function):
-            found.append(item)
+            functions.append(item)
         elif isinstance(item, Struct):
             for key in item.__struct_fields__:
                 visit(getattr(item, key))
@@ -103,7 +103,7 @@ def scene_functions(scene: Scene) -> list[Function]:
 
     for part in (scene.hinges, scene.wheels, scene.point_masses, scene.loads, scene.connectors):
         visit(part)
-    return found
+    return functions
 
 
 def fastest_rate(function: Function, until: float = inf) -> float:

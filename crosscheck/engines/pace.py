@@ -218,23 +218,23 @@ def _turns(at: Frame) -> list[Real]:
 
 def _subtrees(chain: tuple[Link, ...], frames: list[Frame]) -> Real:
     """Spatial inertia (n,6,6) about the World origin of each link with all beyond it."""
-    found = np.zeros((len(chain), 6, 6))
+    inertias = np.zeros((len(chain), 6, 6))
     for number in reversed(range(len(chain))):
         own, at = chain[number].inertia, frames[number]
         to_centre = cross_matrix(at.position + at.rotation @ own.com)
-        found[number, :3, :3] += at.rotation @ own.inertia @ at.rotation.T - own.mass * to_centre @ to_centre
-        found[number, :3, 3:] += own.mass * to_centre
-        found[number, 3:, :3] -= own.mass * to_centre
-        found[number, 3:, 3:] += own.mass * np.eye(3)
+        inertias[number, :3, :3] += at.rotation @ own.inertia @ at.rotation.T - own.mass * to_centre @ to_centre
+        inertias[number, :3, 3:] += own.mass * to_centre
+        inertias[number, 3:, :3] -= own.mass * to_centre
+        inertias[number, 3:, 3:] += own.mass * np.eye(3)
         if chain[number].parent >= 0:
-            found[chain[number].parent] += found[number]
-    return found
+            inertias[chain[number].parent] += inertias[number]
+    return inertias
 
 
 def _beyond(chain: tuple[Link, ...]) -> Real:
     """(n,n): whether the second link is the first or beyond it."""
-    found = np.eye(len(chain), dtype=bool)
+    beyond = np.eye(len(chain), dtype=bool)
     for number, link in enumerate(chain):
         if link.parent >= 0:
-            found[:, number] |= found[:, link.parent]
-    return found
+            beyond[:, number] |= beyond[:, link.parent]
+    return beyond

@@ -137,11 +137,11 @@ def _built_in(path: str) -> Engine:
 
 def _plug_ins() -> dict[str, list[EntryPoint]]:
     """Entry points by name, several if several distributions use the same name."""
-    found: dict[str, list[EntryPoint]] = {}
+    points: dict[str, list[EntryPoint]] = {}
     for point in entry_points(group=GROUP):
-        if point.name not in BUILT_IN and point not in found.setdefault(point.name, []):
-            found[point.name].append(point)
-    return found
+        if point.name not in BUILT_IN and point not in points.setdefault(point.name, []):
+            points[point.name].append(point)
+    return points
 
 
 def _plugged(name: str, points: list[EntryPoint]) -> Engine:

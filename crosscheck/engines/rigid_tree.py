@@ -230,9 +230,9 @@ class PlacedCoupling:
 
     def row(self, speeds: int) -> Real:
         """(nv,) of the Jacobian."""
-        found = np.zeros(speeds)
-        found[[slot.v for slot in self.slots]] = self.factors
-        return found
+        jacobian = np.zeros(speeds)
+        jacobian[[slot.v for slot in self.slots]] = self.factors
+        return jacobian
 
     def load(self, size: float, axis: Real) -> Real:
         """[torque; force] (6,) of the load f along the axis of the coordinate that is led."""

@@ -16,9 +16,9 @@ def signals_of(run: Trajectory) -> dict[str, Real]:
     Matrices are row by row. The channels "known_to.<name>" say how well the engine knows the derivatives and the
     frequencies of its own states; nothing compares them.
     """
-    found = channels_of(run)
-    found |= {f"derivatives.{name}": values for name, values in run.derivatives.items()}
+    signals = channels_of(run)
+    signals |= {f"derivatives.{name}": values for name, values in run.derivatives.items()}
     if run.frequencies is not None:
-        found[FREQUENCIES] = run.frequencies
-    found |= {f"{KNOWN_TO}.{name}": values[:, None] for name, values in run.known_to.items()}
-    return found
+        signals[FREQUENCIES] = run.frequencies
+    signals |= {f"{KNOWN_TO}.{name}": values[:, None] for name, values in run.known_to.items()}
+    return signals

@@ -26,15 +26,15 @@ TRUE_MODEL = "conservation law"
 def judge(case: CaseResults) -> list[Verdict]:
     """All verdicts of a case, in the order of its run file, then those against its stored reference."""
     run = case.case.run
-    found: list[Verdict] = []
+    verdicts: list[Verdict] = []
     for comparison in run.comparisons:
-        found += _comparison(case, comparison)
+        verdicts += _comparison(case, comparison)
     for control in run.controls:
-        found += _control(case, control)
+        verdicts += _control(case, control)
     for conservation in run.conservations:
-        found += (_conservation(case, conservation, engine) for engine in conservation.engines)
-    found += judge_reference(case)
-    return found
+        verdicts += (_conservation(case, conservation, engine) for engine in conservation.engines)
+    verdicts += judge_reference(case)
+    return verdicts
 
 
 def _comparison(case: CaseResults, item: Comparison) -> Iterator[Verdict]:

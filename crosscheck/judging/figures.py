@@ -39,12 +39,12 @@ def worse(figure: Figure | None, E: float | None, U: float | None) -> str:
 def figures(verdicts: Iterable[Verdict], engines: Iterable[str]) -> Accepted:
     """The figures of verdicts between the given `engines`, which are the library's own."""
     own = set(engines)
-    found: Accepted = {}
+    accepted: Accepted = {}
     for verdict in verdicts:
         if recordable(verdict, own) and verdict.E is not None:
             figure = Figure(_rounded(verdict.E), _rounded(verdict.U or 0.0), verdict.basis)
-            found.setdefault(verdict.comparison, {})[key_of(verdict)] = figure
-    return found
+            accepted.setdefault(verdict.comparison, {})[key_of(verdict)] = figure
+    return accepted
 
 
 def recordable(verdict: Verdict, own: Iterable[str]) -> bool:

@@ -299,12 +299,12 @@ def _absences(case: CaseResults) -> list[Absence]:
     wanted += [(control.a.variant, control.a.engine, f"control:{control.name}") for control in run.controls]
     envelopes = [key for key in case.results if key[2] == ENVELOPE]
     wanted += [key for key in envelopes if case.get(*key[:2]).status == "finished"]
-    found = []
+    absences = []
     for variant, engine, role in wanted:
         result = case.get(variant, engine, role)
         if result.status != "finished":
-            found.append(Absence(case.case.case, variant, engine, role, result.status, result.message))
-    return found
+            absences.append(Absence(case.case.case, variant, engine, role, result.status, result.message))
+    return absences
 
 
 def idle_claims(

@@ -90,10 +90,10 @@ class Sizes:
 
     @kept
     def _families(self) -> dict[str, list[str]]:
-        found: dict[str, list[str]] = {}
+        by_family: dict[str, list[str]] = {}
         for name in self.channels:
-            found.setdefault(family(name), []).append(name)
-        return found
+            by_family.setdefault(family(name), []).append(name)
+        return by_family
 
     def _largest(self, measure: Measure, kin: str) -> float:
         """The largest measure in a family; 0 if it has no channel."""

@@ -31,22 +31,22 @@ def meant(word: str, names: Iterable[str], tags: Tags) -> tuple[str, ...]:
     if word == ALL:
         return names
     if any(sign in word for sign in PATTERN_SIGNS):
-        found = tuple(name for name in names if fnmatchcase(name, word))
-        if not found:
+        matching = tuple(name for name in names if fnmatchcase(name, word))
+        if not matching:
             raise CaseError(f'"{word}" is a pattern of names that no case has. `crosscheck list` shows them all.')
-        return found
+        return matching
     named = tuple(name for name in names if word in (name, _last(name)))
     if named:
         return named
     tagged = tags()
-    found = tuple(name for name in names if word == _family(name) or word in tagged[name])
-    if not found:
+    matching = tuple(name for name in names if word == _family(name) or word in tagged[name])
+    if not matching:
         known = {each for name in names for each in (name, _last(name), _family(name), *tagged[name])} | {ALL}
         raise CaseError(
             f'"{word}" is no case, no family, no tag and no folder with a run.toml: {closest(word, known)}. '
             "`crosscheck list` shows them all."
         )
-    return found
+    return matching
 
 
 def chosen(words: Iterable[str], one: Callable[[str], Iterable[str]]) -> tuple[str, ...]:

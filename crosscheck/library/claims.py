@@ -88,7 +88,7 @@ def claims_on(
     `written` is what was read, by where it stands (a file, an option); `names` and `tags` are those of all cases that
     there are, `engines` all engines. CaseError lists what is wrong with its place and the remedy.
     """
-    found = {name: Claims() for name in session}
+    claims = {name: Claims() for name in session}
     for source, content in written.items():
         problems = [str(each) for each in check_expect_file(content, engines)]
         if problems:
@@ -98,9 +98,9 @@ def claims_on(
             called = _called(entry.cases, names, tags, f"{source}: {place.key('cases')}")
             whole = set(called) <= set(session)
             for name in called:
-                if name in found:
-                    found[name] = _with(found[name], entry, where, whole)
-    return found
+                if name in claims:
+                    claims[name] = _with(claims[name], entry, where, whole)
+    return claims
 
 
 def _entries(content: ExpectFile) -> Iterator[tuple[Place, GoalEntry | FailureEntry | EffortsEntry]]:

@@ -114,15 +114,15 @@ def current_reference(case: Case) -> StoredReference:
     CaseError if there is none, if its files are inconsistent, if it is of another variant than the run file
     asks for, or if the scene was changed after it was made.
     """
-    found = load_reference(case.folder)
+    stored = load_reference(case.folder)
     place = f"{case.folder / KNOWLEDGE}:"
-    of, recipe = found.knowledge.variant, case.run.reference
+    of, recipe = stored.knowledge.variant, case.run.reference
     if recipe is not None and recipe.variant != of:
         raise CaseError(f'{place} it is of variant "{of}", [reference] asks for "{recipe.variant}": {AGAIN}')
     variant = case.run.variant(of)
-    if scene_digest(case, variant) != found.knowledge.scene:
+    if scene_digest(case, variant) != stored.knowledge.scene:
         raise CaseError(f"{place} {variant.scene} or its variant was changed after the reference was made: {AGAIN}")
-    return found
+    return stored
 
 
 def column_names(channel: str, width: int) -> list[str]:
@@ -198,17 +198,17 @@ def _channel_of(column: str) -> str:
 
 def _knowledge(file: Path) -> Knowledge:
     try:
-        found = to_struct(parse_toml(_text(file)), Knowledge, str(file))
+        knowledge = to_struct(parse_toml(_text(file)), Knowledge, str(file))
     except SceneError as error:
         raise CaseError(f"{file}: {'; '.join(map(str, error.problems))}") from None
     except Unreadable as error:
         raise CaseError(f"{file}: {error}") from None
-    for channel, known in found.channels.items():
+    for channel, known in knowledge.channels.items():
         if not (0.0 < known.uncertainty < np.inf and 0.0 <= known.scale < np.inf):
             raise CaseError(f"{file}: the uncertainty and scale of {channel} are no numbers that can be judged by")
-    if not 0.0 < found.horizon_s < np.inf:
-        raise CaseError(f"{file}: a horizon of {found.horizon_s:g} s is none")
-    return found
+    if not 0.0 < knowledge.horizon_s < np.inf:
+        raise CaseError(f"{file}: a horizon of {knowledge.horizon_s:g} s is none")
+    return knowledge
 
 
 def _text(file: Path) -> str:

@@ -95,7 +95,7 @@ def goals_for_reference(run: RunFile, engines: Iterable[str]) -> dict[str, tuple
     named = {side.engine for pair in pairs for side in pair.sides}
     pairs = [pair for pair in pairs if pair.expect == "agree"]
     known = _all(run.variant(recipe.variant))
-    found = {}
+    goals_of = {}
     for engine in engines:
         own = [pair for pair in pairs if any(side.engine == engine for side in pair.sides)]
         free = bool(recipe.goals) and engine not in named
@@ -107,8 +107,8 @@ def goals_for_reference(run: RunFile, engines: Iterable[str]) -> dict[str, tuple
                 goals |= {} if recipe.goals else {key: goal for key, goal in pair.goals.items() if key not in goals}
                 scales |= {key: scale for key, scale in pair.scales.items() if key not in scales}
             if goals:
-                found[engine] = goals, scales
-    return found
+                goals_of[engine] = goals, scales
+    return goals_of
 
 
 def expected_otherwise(run: RunFile, variant: str, engine: str) -> Comparison | None:

@@ -48,7 +48,7 @@ class ByReference:
     def of_answer(self, wrong: Mapping[str, Real]) -> dict[str, ShownIn]:
         """The findings on falsified channels (T, k) of the true run, those that the reference has."""
         places = shared_times(self.reference.times, self.true.times)
-        found = {}
+        shown = {}
         for name in self.trusted & set(wrong):
             assert places is not None  # otherwise no channel would be trusted
             pattern = most_specific(self.asked.goals, name)
@@ -58,8 +58,8 @@ class ByReference:
             false = at_samples(Signal(wrong[name], right.uncertainty, right.sizes), places)
             scale = None if scaled is None else self.asked.scales[scaled]
             finding = compare(name, false, self.reference.signal(name), goal, scale)
-            found[name] = ShownIn(status=finding.status, E=finding.E, U=finding.U, goal=goal)
-        return found
+            shown[name] = ShownIn(status=finding.status, E=finding.E, U=finding.U, goal=goal)
+        return shown
 
 
 def by_reference(what: JudgedVariant, true: Result) -> ByReference | str:

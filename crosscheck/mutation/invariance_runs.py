@@ -161,7 +161,7 @@ def role(invariance: str) -> str:
 def _judged(each: _Set, results: CaseResults) -> list[InvarianceVerdict]:
     what = each.what
     true = results.get(what.variant.name, what.engine, MAIN)
-    found = []
+    verdicts = []
     for invariance in INVARIANCES:
         head = InvarianceVerdict(
             case=what.case.name,
@@ -171,21 +171,21 @@ def _judged(each: _Set, results: CaseResults) -> list[InvarianceVerdict]:
             status="not applicable",
         )
         if invariance.name in each.without:
-            found.append(msgspec.structs.replace(head, reason=each.without[invariance.name]))
+            verdicts.append(msgspec.structs.replace(head, reason=each.without[invariance.name]))
             continue
         other = results.get(what.variant.name, what.engine, role(invariance.name))
         if other.status == "refused" and NO_START in other.message:
-            found.append(msgspec.structs.replace(head, reason=other.message))
+            verdicts.append(msgspec.structs.replace(head, reason=other.message))
             continue
         ended = next((one for one in (true, other) if one.status != "finished"), None)
         if ended is not None:
-            found.append(msgspec.structs.replace(head, status=ended.status, reason=ended.message))
+            verdicts.append(msgspec.structs.replace(head, status=ended.status, reason=ended.message))
             continue
         if true.rests and not _is_linearised(true):
-            found.append(msgspec.structs.replace(head, reason="nothing moves"))
+            verdicts.append(msgspec.structs.replace(head, reason="nothing moves"))
             continue
-        found.append(_verdict(head, _findings(what, true, other, each.counterparts[invariance.name])))
-    return found
+        verdicts.append(_verdict(head, _findings(what, true, other, each.counterparts[invariance.name])))
+    return verdicts
 
 
 def _is_linearised(true: Result) -> bool:
@@ -200,7 +200,7 @@ def _is_linear(channel: str) -> bool:
 def _findings(what: JudgedVariant, true: Result, other: Result, counterpart: Counterpart) -> dict[str, Finding]:
     """A finding for every channel of the true run that the counterpart has too, whether or not the case judges it."""
     told = _told(other, counterpart)
-    found: dict[str, Finding] = {}
+    findings: dict[str, Finding] = {}
     for name in true.channels:
         if name not in told.channels or not is_judged(name) or (true.rests and not _is_linear(name)):
             continue
@@ -214,8 +214,8 @@ def _findings(what: JudgedVariant, true: Result, other: Result, counterpart: Cou
             None if scale is None else what.scales[scale],
         )
         if pattern is not None or finding.status != "unresolved":  # a channel without a goal may be only rounding
-            found[name] = finding
-    return found
+            findings[name] = finding
+    return findings
 
 
 def _told(other: Result, counterpart: Counterpart) -> Result:

@@ -68,7 +68,7 @@ def decoded_lines(file: Path, kind: Any) -> list[Any]:
     """`read` for records of any tagged struct or union of them."""
     decoder = msgspec.json.Decoder(kind)
     left = allowance(regular_size(file))
-    found: list[Any] = []
+    records: list[Any] = []
     with file.open("rb") as stream:
         for number, line in enumerate(_lines(stream), start=1):
             try:
@@ -76,8 +76,8 @@ def decoded_lines(file: Path, kind: Any) -> list[Any]:
                 left -= _checked(record, left)
             except (ValueError, RecursionError) as error:  # broken JSON, another schema, text that is not UTF-8
                 record = BrokenLine(str(file), number, _reason(error, line))
-            found.append(record)
-    return found
+            records.append(record)
+    return records
 
 
 def _reason(error: Exception, line: bytes) -> str:

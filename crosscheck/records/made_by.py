@@ -79,13 +79,13 @@ def _library(top: str) -> str:
 def _required(library: Distribution) -> list[Distribution]:
     """Installed distributions that one requires, extras left out."""
     names = [re.split(r"[^\w.-]", text, maxsplit=1)[0] for text in library.requires or () if "extra ==" not in text]
-    found = []
+    libraries = []
     for name in names:
         try:
-            found.append(distribution(name))
+            libraries.append(distribution(name))
         except PackageNotFoundError:  # required on other platforms
             continue
-    return found
+    return libraries
 
 
 def _content(library: Distribution) -> str:

@@ -39,12 +39,12 @@ def sources(modules: Iterable[str], alone: Iterable[str] = ()) -> Sources:
     """
     for package in OURS:
         source_folder(package)
-    found = Sources()
+    known = Sources()
     waiting = list(dict.fromkeys(modules))
     own = {*OURS, *(_top(module) for module in waiting)}
     seen, read = set[str](), set[str]()
     for module in alone:
-        found.files.update(_with_parents(module))
+        known.files.update(_with_parents(module))
     while waiting:
         module = waiting.pop()
         if module in seen:
@@ -54,19 +54,19 @@ def sources(modules: Iterable[str], alone: Iterable[str] = ()) -> Sources:
         if top in sys.stdlib_module_names:
             continue
         if top not in own and owner(top) is not None:
-            found.libraries.add(top)
+            known.libraries.add(top)
             continue
         files = _with_parents(module)
         if not files:
             if not _place(top):
-                found.libraries.add(top)  # a result can also depend on a library being absent
+                known.libraries.add(top)  # a result can also depend on a library being absent
             continue
-        found.files.update(files)
+        known.files.update(files)
         for name, file in files.items():
             if name not in read and (name != "flexmb" or module == "flexmb"):  # flexmb/__init__.py imports everything
                 read.add(name)
                 waiting.extend(imported(name, file))
-    return found
+    return known
 
 
 def imported(module: str, file: Path) -> Iterator[str]:

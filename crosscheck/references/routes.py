@@ -212,7 +212,7 @@ def _function(file: Path) -> Callable[[Real], Mapping[str, Real]]:
         spec.loader.exec_module(module)
     except Exception as error:  # the file is anybody's
         raise CaseError(f"{file}: it cannot be loaded: {type(error).__name__}: {error}") from None
-    found: Callable[[Real], Mapping[str, Real]] | None = getattr(module, "exact", None)
-    if found is None:
+    function: Callable[[Real], Mapping[str, Real]] | None = getattr(module, "exact", None)
+    if function is None:
         raise CaseError(f"{file}: it has no function exact(times): add one that returns channels by name")
-    return found
+    return function

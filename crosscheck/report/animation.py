@@ -14,16 +14,16 @@ from flexmb.typing import Real
 
 def animations(store: Store, case: CaseResults) -> list[dict[str, Any]]:
     """One animation for each variant: from its film, else from the markers that an engine recorded."""
-    found = []
+    animated = []
     for variant in case.case.run.variants:
         info = case.case.variants[variant.name]
         films = [(case.get(variant.name, engine, FILM), info.film) for engine in variant.engines]
         mains = [(case.get(variant.name, engine), info.drawing) for engine in variant.engines]
         for result, drawing in (*films, *mains):
             if drawing is not None and drawing.lines and _drawable(result, drawing):
-                found.append(_animation(store, result, drawing))
+                animated.append(_animation(store, result, drawing))
                 break
-    return found
+    return animated
 
 
 def _animation(store: Store, result: Result, drawing: Drawing) -> dict[str, Any]:

@@ -158,7 +158,7 @@ def _without_rounding(views: list[dict[str, Any]]) -> None:
 
 def _drifts(store: Store, case: CaseResults) -> list[dict[str, Any]]:
     """Drift of energy (less work) and of momentum of the variants that claim to conserve them, relative."""
-    found = []
+    drifts = []
     for item in case.case.run.conservations:
         curves = []
         for engine in item.engines:
@@ -173,8 +173,8 @@ def _drifts(store: Store, case: CaseResults) -> list[dict[str, Any]]:
                 curves.append({"engine": engine, "times": store.times(result.times), "values": values})
         if curves:
             title = f"{item.quantity.replace('_', ' ').capitalize()}, {item.variant}"
-            found.append({"title": title, "limit": item.limit, "curves": curves})
-    return found
+            drifts.append({"title": title, "limit": item.limit, "curves": curves})
+    return drifts
 
 
 def _work(chart: WorkPrecision) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from flexmb.output.printable import printable
 @cache
 def templates() -> Environment:
     """The templates; their output is escaped and has no control characters."""
-    found = Environment(
+    environment = Environment(
         loader=PackageLoader("crosscheck.report"),
         autoescape=select_autoescape(["html.j2"], default_for_string=True, default=True),
         trim_blocks=True,
@@ -24,10 +24,10 @@ def templates() -> Environment:
         keep_trailing_newline=False,
         finalize=_shown,
     )
-    found.filters["code"] = code
-    found.filters["breakable"] = _breakable
-    found.filters["power"] = _power
-    return found
+    environment.filters["code"] = code
+    environment.filters["breakable"] = _breakable
+    environment.filters["power"] = _power
+    return environment
 
 
 def source(name: str) -> Markup:

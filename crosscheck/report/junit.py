@@ -96,24 +96,24 @@ def _failed(suite: ElementTree.Element, classname: str, name: str, kind: str, me
 
 def _not_judged(suite: ElementTree.Element, case: str, outcome: SessionOutcome) -> list[str]:
     """Add tests for what is not applicable in a case, and for a missing reference; returns their outcomes."""
-    found = []
+    outcomes = []
     for each in outcome.inapplicable:
         if each.case == case:
             test = ElementTree.SubElement(suite, "testcase", classname=case, name=f"{each.where} by {each.engine}")
             ElementTree.SubElement(test, "skipped", message=f"not applicable: {each.reason}")
-            found.append("skipped")
+            outcomes.append("skipped")
     for group in grouped(each for each in outcome.unaccounted if each.case == case):
         name = f"what {group.engine} offers on {group.variant} is judged: {', '.join(group.channels)}"
         test = ElementTree.SubElement(suite, "testcase", classname=case, name=name)
         kind = "failure" if outcome.strict else "skipped"
         ElementTree.SubElement(test, kind, message=f"judged by nothing: {group.reason}")
-        found.append(kind)
+        outcomes.append(kind)
     if case in outcome.unreferenced:
         test = ElementTree.SubElement(suite, "testcase", classname=case, name="it has a stored reference")
         kind = "failure" if outcome.strict else "skipped"
         ElementTree.SubElement(test, kind, message=f"{case} {NO_REFERENCE.format(case)}")
-        found.append(kind)
-    return found
+        outcomes.append(kind)
+    return outcomes
 
 
 def _complaint(outcome: SessionOutcome, verdict: Verdict) -> str:

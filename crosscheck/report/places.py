@@ -33,7 +33,7 @@ class CasePlace:
 
 def places(cases: Iterable[str], single: bool) -> dict[str, CasePlace]:
     """The place of every case: `<family>/<case>.html`, in letters that are valid in all file systems and addresses."""
-    found: dict[str, CasePlace] = {}
+    place_of: dict[str, CasePlace] = {}
     taken = {INDEX}
     for number, case in enumerate(cases):
         stem = "/".join(_plain(part) for part in case.split("/")[-2:])
@@ -42,8 +42,8 @@ def places(cases: Iterable[str], single: bool) -> dict[str, CasePlace]:
             page = f"{stem}-{number}.html"
             stem += "-"
         taken.add(page.lower())
-        found[case] = CasePlace("" if single else page, f"case-{number}")
-    return found
+        place_of[case] = CasePlace("" if single else page, f"case-{number}")
+    return place_of
 
 
 def _plain(part: str) -> str:

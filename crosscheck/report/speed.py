@@ -138,8 +138,8 @@ def standing(charts: Iterable[WorkPrecision], engine: str, error: float) -> Stan
 
 def fastest(chart: WorkPrecision, error: float) -> dict[str, float]:
     """For each engine the wall time (s) of its fastest run whose error is at most `error`."""
-    found: dict[str, float] = {}
+    times: dict[str, float] = {}
     for point in chart.points:
         if point.error is not None and point.error <= error and point.wall_s > 0.0:
-            found[point.engine] = min(found.get(point.engine, point.wall_s), point.wall_s)
-    return found
+            times[point.engine] = min(times.get(point.engine, point.wall_s), point.wall_s)
+    return times

@@ -79,10 +79,10 @@ def _open_in_run(scene: Scene, t_end: float) -> set[str]:
         run = simulate(allowed, t_end, samples=PLACES, rtol=1e-8, atol=1e-10, max_steps=STEPS)
     except (ClosureError, NotImplementedError):
         return set()
-    dense, found = DenseSystem(scene), set[str]()
+    dense, unknown = DenseSystem(scene), set[str]()
     for state, held in _states(dense, run):
-        found |= _at(dense, state, held)
-    return found
+        unknown |= _at(dense, state, held)
+    return unknown
 
 
 def _states(dense: DenseSystem, run: Trajectory) -> Iterator[tuple[State, Held]]:

@@ -36,7 +36,7 @@ def samples_table(file: Path, sweep: SweepFile) -> Iterator[Callable[[SampleReco
     growing = file.with_suffix(f".unfinished{file.suffix}")
     parameters = [parameter.title for parameter in sweep.parameters]
     quantities = [quantity.name for quantity in sweep.quantities]
-    header = ["sample", "engine", "status", *parameters, *quantities, "message"]
+    header: list[object] = ["sample", "engine", "status", *parameters, *quantities, "message"]
     lines: dict[tuple[int, str], list[object]] = {}
     with writing(growing):
         stream = growing.open("w", encoding="utf-8", newline="")
@@ -48,7 +48,7 @@ def samples_table(file: Path, sweep: SweepFile) -> Iterator[Callable[[SampleReco
     def add(record: SampleRecord) -> None:
         given = [record.parameters[name] for name in parameters]
         numbers = [record.quantities.get(name, "") for name in quantities]
-        line = [record.sample, record.engine, record.status, *given, *numbers, record.message]
+        line: list[object] = [record.sample, record.engine, record.status, *given, *numbers, record.message]
         lines[record.sample, record.engine] = line
         append(line)
 

@@ -66,11 +66,11 @@ def read_results(file: Path) -> SealedResults:
 
 def read_finished(file: Path) -> SealedResults:
     """The results of a session that has come to its end; ResultsError for any other."""
-    found = read_results(file)
-    if found.unfinished:
-        began = f", begun at {found.made.at}" if found.made.at else ""
+    results = read_results(file)
+    if results.unfinished:
+        began = f", begun at {results.made.at}" if results.made.at else ""
         raise ResultsError(f"{file} is unfinished{began}: the session runs, or it was killed. Run it to its end")
-    return found
+    return results
 
 
 def _seal(content: dict[str, Any]) -> str:

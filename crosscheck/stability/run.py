@@ -110,8 +110,8 @@ def run_map(
 def maps_of(provider: str) -> dict[str, StabilityMap]:
     """Maps by name, from "module:function"."""
     module, _, function = provider.partition(":")
-    found: dict[str, StabilityMap] = getattr(import_module(module), function)()
-    return found
+    known: dict[str, StabilityMap] = getattr(import_module(module), function)()
+    return known
 
 
 def run_cell(job: CellJob, emit: Callable[[Any], None]) -> None:

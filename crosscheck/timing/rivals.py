@@ -202,10 +202,10 @@ def _errors(
     places = shared_times(reference.times, times)
     if places is None:
         return {}
-    found = {}
+    errors = {}
     for name, scale in scales.items():
         if name in channels and channels[name].shape[1:] == reference.channels[name].shape[1:]:
             with np.errstate(over="ignore", invalid="ignore"):
                 apart = float(np.max(distance(name, channels[name][places], reference.channels[name]))) / scale
-            found[name] = apart if np.isfinite(apart) else np.inf
-    return found
+            errors[name] = apart if np.isfinite(apart) else np.inf
+    return errors

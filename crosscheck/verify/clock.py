@@ -96,21 +96,21 @@ def _rates(
 ) -> dict[str, Real]:
     """The rates of change of the channels that move: by splines, or where these are too rough, by differences of the
     reference close to each sample."""
-    found, rough = {}, {}
+    rates, rough = {}, {}
     for channel, seen in differing.items():
         if len(seen.times) < FEWEST or not (seen.is_visible and seen.varies):
             continue
         rows = _continuous(channel, seen.reference)
-        found[channel], other = (
+        rates[channel], other = (
             np.asarray(make_interp_spline(seen.times, rows, k=degree).derivative()(seen.times), float)
             for degree in DEGREES
         )
-        if np.linalg.norm(found[channel] - other) > ROUGH * np.linalg.norm(other):
-            del found[channel]
+        if np.linalg.norm(rates[channel] - other) > ROUGH * np.linalg.norm(other):
+            del rates[channel]
             rough[channel] = seen
     vectors = [channel for channel in rough if not channel.endswith(".orientation")]  # quaternions may have any signs
     if not vectors:
-        return found
+        return rates
     times = rough[vectors[0]].times
     step = CLOSE * float(np.min(np.diff(times)))
     early, late = np.maximum(times - step, 0.0), np.minimum(times + step, t_end)
@@ -119,8 +119,8 @@ def _rates(
     before, behind = np.searchsorted(asked, early), np.searchsorted(asked, late)
     for channel in vectors:
         if channel in there:
-            found[channel] = (there[channel][behind] - there[channel][before]) / (late - early)[:, None]
-    return found
+            rates[channel] = (there[channel][behind] - there[channel][before]) / (late - early)[:, None]
+    return rates
 
 
 def _continuous(channel: str, rows: Real) -> Real:

@@ -190,23 +190,23 @@ def _check_times(numbers: list[int], given: Real, times: Real) -> None:
 
 def _channels(filled: dict[str, Real]) -> dict[str, Real]:
     """Complete groups of filled columns as channels; VerifyError for a column of no complete group."""
-    found: dict[str, Real] = {}
+    channels: dict[str, Real] = {}
     left = dict(filled)
     for channel in _whole(left):
         names = short_names(channel, _width(channel, left))
         if all(name in left for name in names):
-            found[channel] = np.column_stack([left.pop(name) for name in names])
+            channels[channel] = np.column_stack([left.pop(name) for name in names])
     for item in dict.fromkeys(name.rpartition(".")[0] for name in filled):
         for prefix, groups in (("marker", MARKER_GROUPS), ("load", LOAD_GROUPS)):
             for part, letters in groups.items():
                 names = [f"{item}.{letter}" for letter in letters]
                 if all(name in left for name in names):
-                    found[f"{prefix}:{item}.{part}"] = np.column_stack([left.pop(name) for name in names])
+                    channels[f"{prefix}:{item}.{part}"] = np.column_stack([left.pop(name) for name in names])
     if left:
         raise VerifyError(f"no whole group contains {_listed(list(left))}; the groups are {_groups_text()}")
-    if not found:
+    if not channels:
         raise VerifyError("there is nothing in it but times")
-    return found
+    return channels
 
 
 def _whole(columns: Iterable[str]) -> list[str]:

@@ -18,15 +18,15 @@ from flexmb.typing import Real
 
 def diagnose(differing: Mapping[str, Evidence], target: Target) -> dict[str, tuple[str, ...]]:
     """For each channel that differs its possible causes, none if nothing known makes it agree."""
-    found = {channel: possible_causes(seen) for channel, seen in differing.items()}
-    found |= {channel: (cause,) for channel, cause in offset_totals(differing, found).items()}
+    causes = {channel: possible_causes(seen) for channel, seen in differing.items()}
+    causes |= {channel: (cause,) for channel, cause in offset_totals(differing, causes).items()}
 
     def reference_at(times: Real) -> dict[str, Real]:
         return {name: signal.values for name, signal in target.signals(times).items()}
 
     with suppress(CaseError, VerifyError):  # no engine of the reference runs here: causes that need one stay unknown
-        found |= _by_runs(differing, found, target, reference_at)
-    return found
+        causes |= _by_runs(differing, causes, target, reference_at)
+    return causes
 
 
 def _by_runs(

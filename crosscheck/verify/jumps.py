@@ -48,12 +48,12 @@ def at_jumps(
     if not len(inside):
         return {}
     there = reference_at(inside)
-    found = {}
+    jumps = {}
     for name, each in suspects.items():
         if name in there:
             flags = [_jumps(name, each, i, row, inside, there[name]) for i, row in enumerate(asked[name])]
-            found[name] = each.places[np.array(flags, bool)]
-    return found
+            jumps[name] = each.places[np.array(flags, bool)]
+    return jumps
 
 
 def _around(when: Real, near_s: float) -> Real:

@@ -175,8 +175,8 @@ def _sliding_chain(parts: list[CraftPart]) -> tuple[Any, tuple[str, str]]:
 
 
 def _definite(inertia: Real) -> list[list[float]]:
-    found: list[list[float]] = (inertia + NEGLIGIBLE * np.eye(3)).tolist()
-    return found
+    definite: list[list[float]] = (inertia + NEGLIGIBLE * np.eye(3)).tolist()
+    return definite
 
 
 def _column(vector: Real) -> list[list[float]]:

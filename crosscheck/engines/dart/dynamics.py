@@ -78,21 +78,21 @@ class DartDynamics:
 
     def _speeds(self, state: TreeState) -> Real:
         """DART's speeds (nv,) of the scene's."""
-        found = state.v.copy()
+        speeds = state.v.copy()
         for slot in self._floating:
             R = slot.link.inboard.rotation @ rotation_matrix(state.q[slot.q + 3 : slot.q + 7])
-            found[slot.v : slot.v + 6] = rotate_spatial(R, state.v[slot.v : slot.v + 6])
-        return found
+            speeds[slot.v : slot.v + 6] = rotate_spatial(R, state.v[slot.v : slot.v + 6])
+        return speeds
 
     def _positions(self, q: Real) -> Real:
         """DART's coordinates (nv,) of the scene's (nq,)."""
-        found = np.empty(self.tree.skeleton.getNumDofs())
-        found[self._coordinates.scalar_v] = q[self._coordinates.scalar_q]
+        positions = np.empty(self.tree.skeleton.getNumDofs())
+        positions[self._coordinates.scalar_v] = q[self._coordinates.scalar_q]
         for slot in self._balls:
-            found[slot.v : slot.v + 3] = _rotation_vector(q[slot.q : slot.q + 4])
+            positions[slot.v : slot.v + 3] = _rotation_vector(q[slot.q : slot.q + 4])
         for slot in self._floating:
-            found[slot.v : slot.v + 6] = [*_rotation_vector(q[slot.q + 3 : slot.q + 7]), *q[slot.q : slot.q + 3]]
-        return found
+            positions[slot.v : slot.v + 6] = [*_rotation_vector(q[slot.q + 3 : slot.q + 7]), *q[slot.q : slot.q + 3]]
+        return positions
 
 
 def _rotation_vector(quaternion: Real) -> Real:

@@ -107,11 +107,11 @@ class DrakeLoads:
     def applied(
         self, t: float, poses: list[RigidTransform], speeds: list[SpatialVelocity]
     ) -> list[ExternallyAppliedSpatialForce]:
-        found = [_applied(t, poses, body, load) for body, load in self._loads]
+        wrenches = [_applied(t, poses, body, load) for body, load in self._loads]
         for at, load in self._connectors.loads(self.exerted(t, poses, speeds)):
             body = self._bodies[at.link].index()
-            found.append(_wrench(body, at.frame.position, SpatialForce(load[:3], load[3:])))
-        return found
+            wrenches.append(_wrench(body, at.frame.position, SpatialForce(load[:3], load[3:])))
+        return wrenches
 
     def exerted(self, t: float, poses: list[RigidTransform], speeds: list[SpatialVelocity]) -> dict[str, Exerted]:
         """What connectors between nodes do, by name."""
@@ -136,9 +136,9 @@ def _applied(
 
 def _wrench(body: BodyIndex, point: Real, load: SpatialForce) -> ExternallyAppliedSpatialForce:
     """A load about a point (3,) of a body, World axes."""
-    found = ExternallyAppliedSpatialForce()
-    found.body_index, found.p_BoBq_B, found.F_Bq_W = body, point, load
-    return found
+    applied = ExternallyAppliedSpatialForce()
+    applied.body_index, applied.p_BoBq_B, applied.F_Bq_W = body, point, load
+    return applied
 
 
 class DrakeActions(LeafSystem):

@@ -124,7 +124,7 @@ class DrakeLinear:
             rotation = self._plant.EvalBodyPoseInWorld(context, self._plant.get_body(body)).rotation()
             vector = rotation.matrix() @ vector
         none = np.zeros(3)
-        found = ExternallyAppliedSpatialForce_[AutoDiffXd]()
+        applied = ExternallyAppliedSpatialForce_[AutoDiffXd]()
         force = SpatialForce_[AutoDiffXd](*((none, vector) if load.is_force else (vector, none)))
-        found.body_index, found.p_BoBq_B, found.F_Bq_W = body, load.point, force
-        return found
+        applied.body_index, applied.p_BoBq_B, applied.F_Bq_W = body, load.point, force
+        return applied

@@ -76,12 +76,12 @@ class DrakeModel:
         self._actions.before_end = np.inf
         context = self._diagram.CreateDefaultContext()
         own = self._tree.plant.GetMyContextFromRoot(context)
-        found = []
+        snapshots = []
         for t, state in zip(times, states, strict=True):
             self._put(context, t, state)
             acceleration = self._tree.plant.get_generalized_acceleration_output_port().Eval(own)
-            found.append(self._observer.observe(t, state, acceleration))
-        return found
+            snapshots.append(self._observer.observe(t, state, acceleration))
+        return snapshots
 
     def _put(self, context: Context, t: float, state: DrakeState) -> None:
         """Set the state of a context of the diagram; setting the time also invalidates cached actions."""

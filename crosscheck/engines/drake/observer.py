@@ -87,12 +87,12 @@ class DrakeObserver:
         """[torque; force] (6,) on every link about its frame's origin."""
         plant, context = self._tree.plant, self._context
         reactions = plant.get_reaction_forces_output_port().Eval(context)
-        found = []
+        loads = []
         for body, joint in zip(self._tree.bodies, self._tree.joints, strict=True):
             R = body.EvalPoseInWorld(context).rotation().matrix()
             load = reactions[int(joint.index())]
-            found.append(np.concatenate([R @ load.rotational(), R @ load.translational()]))
-        return found
+            loads.append(np.concatenate([R @ load.rotational(), R @ load.translational()]))
+        return loads
 
     def _marker(self, at: Attachment) -> MarkerSnapshot:
         body, context = self._tree.bodies[at.link], self._context

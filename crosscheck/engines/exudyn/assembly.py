@@ -103,12 +103,12 @@ class Assembly:
 
     def deflection_measures(self) -> list[tuple[slice, Real]]:
         """The places of the modal coordinates, and their reach, for every flexible body."""
-        found = []
+        measures = []
         for placed in self.bodies.values():
             if placed.carrier.modes is not None:
                 first = self.shop.mbs.GetNodeODE2Index(placed.carrier.modes)
-                found.append((slice(first, first + len(placed.eta)), placed.reach))
-        return found
+                measures.append((slice(first, first + len(placed.eta)), placed.reach))
+        return measures
 
 
 def unconstrained(scene: Scene) -> bool:
@@ -280,12 +280,12 @@ def _modal_state(scene: Scene, body: ModalBody) -> tuple[Real, Real]:
 
 def _cross(shape: NodeShape) -> list[Real]:
     """Four mesh points [position, modes] (3, 1+m) about a node, in its y-z plane, moving as its section does."""
-    found = []
+    points = []
     for arm in (Y, Z, -Y, -Z):
         p = CROSS_ARM * (shape.rotation @ arm)
         moved = shape.translation + np.cross(shape.rotation_modes.T, p).T
-        found.append(np.column_stack([shape.position + p, moved]))
-    return found
+        points.append(np.column_stack([shape.position + p, moved]))
+    return points
 
 
 def _port(shop: Workshop, parent: Placed, node: str, offset: Frame) -> HingePort:

@@ -103,10 +103,10 @@ def _flexible(assembly: Assembly, carrier: Carrier, path: CarrierPath, states: S
 
 def strain_energy(elements: tuple[BeamElement, ...], paths: dict[int, CarrierPath]) -> Real:
     """(T,) of all elements: half their length times strain' K strain."""
-    found = np.zeros(len(paths[-1].position))
+    energy = np.zeros(len(paths[-1].position))
     for element in elements:
         left, right = paths[element.left.key], paths[element.right.key]
         turn = np.swapaxes(left.rotation, 1, 2) @ right.rotation
         apart = np.einsum("tji,tj->ti", left.rotation, right.position - left.position)
-        found += 0.5 / element.length * (logarithm(turn, apart) - element.rest) ** 2 @ element.stiffness
-    return found
+        energy += 0.5 / element.length * (logarithm(turn, apart) - element.rest) ** 2 @ element.stiffness
+    return energy

@@ -98,22 +98,22 @@ def connected(assembly: Assembly, states: States, paths: Paths) -> Connected:
 
 
 def _between(assembly: Assembly, states: States, paths: Paths) -> dict[str, list[Exerted]]:
-    found = {}
+    exerted = {}
     for connector in assembly.scene.connectors:
         if isinstance(connector, BetweenNodes):
             a, b = (_moving(assembly, end, paths, len(states.times)) for end in ends(connector))
             law = exerts(connector)
-            found[connector.name] = [law(t, *ends) for t, *ends in zip(states.times.tolist(), a, b, strict=True)]
-    return found
+            exerted[connector.name] = [law(t, *ends) for t, *ends in zip(states.times.tolist(), a, b, strict=True)]
+    return exerted
 
 
 def _along(assembly: Assembly, times: list[float], paths: Paths) -> dict[str, list[Along]]:
-    found = {}
+    loads = {}
     for name, item, number, load in along_hinges(assembly.scene):
         stage = assembly.links[item].stages[number]
         motion = zip(times, coordinate(stage, paths).tolist(), coordinate_rate(stage, paths).tolist(), strict=True)
-        found[name] = [load(*each) for each in motion]
-    return found
+        loads[name] = [load(*each) for each in motion]
+    return loads
 
 
 def _moving(assembly: Assembly, end: EndFrame, paths: Paths, count: int) -> list[Moving]:

@@ -66,10 +66,10 @@ def initial_state(assembly: Assembly | PlanarBeam) -> States:
 
 def _prescribed_accelerations(assembly: Assembly | PlanarBeam, size: int) -> Real:
     """Second derivatives of the offsets in the rows of their constraints (coordinate - offset = 0)."""
-    found = np.zeros(size)
+    accelerations = np.zeros(size)
     for constraint, profile in assembly.prescribed:
-        found[assembly.shop.mbs.systemData.GetObjectLTGAE(constraint)[0]] = profile(0.0).acceleration
-    return found
+        accelerations[assembly.shop.mbs.systemData.GetObjectLTGAE(constraint)[0]] = profile(0.0).acceleration
+    return accelerations
 
 
 def body_mass_matrix(assembly: Assembly, body: str) -> Real:

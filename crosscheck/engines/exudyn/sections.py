@@ -102,20 +102,20 @@ def _interpolated(body: BeamBody, matrices: list[Real], x: Real) -> Real:
     """Matrices (n,6,6) at x (n,), linear between stations."""
     at = [station.x_m for station in body.stations]
     stacked = np.array(matrices)
-    found = np.empty((len(x), 6, 6))
+    interpolated = np.empty((len(x), 6, 6))
     for i in range(6):
         for j in range(6):
-            found[:, i, j] = np.interp(x, at, stacked[:, i, j])
-    return found
+            interpolated[:, i, j] = np.interp(x, at, stacked[:, i, j])
+    return interpolated
 
 
 def _stiffness(body: BeamBody, x: Real) -> Real:
     """Diagonals (n,6) of the stiffness. A beam without shear yields to shear as little as to stretch: stiffer springs
     would stop Newton's method at steps that follow the bending."""
-    found = np.array([np.diag(each) for each in _interpolated(body, [*map(stiffness_on_axis, body.stations)], x)])
+    diagonals = np.array([np.diag(each) for each in _interpolated(body, [*map(stiffness_on_axis, body.stations)], x)])
     if not shears(body):
-        found[:, 1:3] = found[:, :1]
-    return found
+        diagonals[:, 1:3] = diagonals[:, :1]
+    return diagonals
 
 
 def shears(body: BeamBody) -> bool:

@@ -33,13 +33,13 @@ def link_wrenches(assembly: Assembly, states: States, paths: dict[int, CarrierPa
 def drives(assembly: Assembly, states: States) -> dict[str, Real]:
     """(T,n) generalised load of every prescribed coordinate, by hinge, wheel or point mass."""
     data = assembly.shop.mbs.systemData
-    found = {}
+    loads = {}
     for name, link in assembly.links.items():
         rows = [data.GetObjectLTGAE(s.constraint)[0] for s in link.stages if s.constraint is not None]
         if rows:
             # Exudyn writes M a + C' multiplier = f with C = + d(coordinate)/dq: the load is minus the multiplier
-            found[name] = -states.multipliers[:, rows]
-    return found
+            loads[name] = -states.multipliers[:, rows]
+    return loads
 
 
 def _connector_wrench(assembly: Assembly, link: ExudynLink) -> Real:

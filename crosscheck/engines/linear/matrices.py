@@ -91,13 +91,13 @@ def scaled_condition(positive: Real) -> float:
 def quaternion_transport(u: Real, turning: Sequence[int], moving: Sequence[int]) -> Real:
     """The transport (n,n) of speeds u (n,), where the angular velocities of ball joints begin at `turning`, and those
     of free flight at `moving`, followed by velocities."""
-    found = np.zeros((len(u), len(u)))
+    transport = np.zeros((len(u), len(u)))
     for j in (*turning, *moving):
-        found[j : j + 3, j : j + 3] = -_cross(u[j : j + 3])
+        transport[j : j + 3, j : j + 3] = -_cross(u[j : j + 3])
     for j in moving:
-        found[j + 3 : j + 6, j : j + 3] = -_cross(u[j + 3 : j + 6])
-        found[j + 3 : j + 6, j + 3 : j + 6] = -_cross(u[j : j + 3])
-    return found
+        transport[j + 3 : j + 6, j : j + 3] = -_cross(u[j + 3 : j + 6])
+        transport[j + 3 : j + 6, j + 3 : j + 6] = -_cross(u[j : j + 3])
+    return transport
 
 
 def _cross(v: Real) -> Real:

@@ -79,18 +79,18 @@ class MujocoLinear:
 
     def _weights(self) -> Real:
         """(nv,) sums of the sizes of all bodies' weights along the speeds, which may cancel at rest."""
-        model, found, J = self._model, np.zeros(self._model.nv), np.empty((3, self._model.nv))
+        model, weights, J = self._model, np.zeros(self._model.nv), np.empty((3, self._model.nv))
         for body in range(1, model.nbody):
             mujoco.mj_jacBodyCom(model, self._data, J, None, body)
-            found += model.body_mass[body] * norm(model.opt.gravity) * np.linalg.norm(J, axis=0)
-        return found
+            weights += model.body_mass[body] * norm(model.opt.gravity) * np.linalg.norm(J, axis=0)
+        return weights
 
     def _step(self, eps: float) -> Real:
         """d [q; v] after a step by d [q; v] before it (2nv,2nv)."""
         model = self._model
-        found = np.empty((2 * model.nv, 2 * model.nv))
-        mujoco.mjd_transitionFD(model, self._data, eps, True, found, None, None, None)
-        return found
+        transition = np.empty((2 * model.nv, 2 * model.nv))
+        mujoco.mjd_transitionFD(model, self._data, eps, True, transition, None, None, None)
+        return transition
 
     def _axes(self, acceleration: Real) -> OutboardAxes:
         """The change to outboard axes of the shifts of free flights."""

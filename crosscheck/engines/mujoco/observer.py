@@ -78,19 +78,19 @@ class MujocoObserver:
         The three rows of each point of a closure are along World's axes, of A less B; the only row of a coupling is its
         load.
         """
-        found, start = {}, 0
+        loads, start = {}, 0
         for number, closed in enumerate(self._closures):
-            found[closed.name] = np.zeros(6)
+            loads[closed.name] = np.zeros(6)
             body = 0 if closed.b.link < 0 else self._tree.bodies[closed.b.link]
             place = data.xpos[body] + data.xmat[body].reshape(3, 3) @ closed.b.frame.position
             for _, site in closed.sites(number):
                 force = -self._rows(data)[start : start + 3]
                 torque = cross(data.site(site).xpos - place, force)
-                found[closed.name] += np.concatenate([torque, force])
+                loads[closed.name] += np.concatenate([torque, force])
                 start += 3
         for coupling, size in zip(self._couplings, self._held(data).tolist(), strict=True):
-            found[coupling.name] = coupling.load(size, data.xaxis[coupling.slots[0].joint].copy())
-        return found
+            loads[coupling.name] = coupling.load(size, data.xaxis[coupling.slots[0].joint].copy())
+        return loads
 
     def _rows(self, data: mujoco.MjData) -> Real:
         """Forces of the rows of all closures, then of all couplings."""

@@ -75,9 +75,9 @@ class PinocchioClosures:
 
     def _in_world(self) -> list[tuple[tuple[Real, Real], Real]]:
         """By closure (torque, force) on B, and where B is; Pinocchio's force is that on A, in its axes."""
-        found = []
+        loads = []
         for each in self._found:
             R = each.oMc1.rotation
             load = (-R @ each.contact_force.angular, -R @ each.contact_force.linear)
-            found.append((load, each.oMc2.translation.copy()))
-        return found
+            loads.append((load, each.oMc2.translation.copy()))
+        return loads

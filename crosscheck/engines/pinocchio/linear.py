@@ -77,14 +77,14 @@ class PinocchioLinear:
 
     def _pull(self, state: TreeState, acting: Acting) -> Real:
         """d tau/d xi (nv,nv) of springs and of loads in World axes."""
-        found = np.zeros((self._model.nv, self._model.nv))
+        stiffness = np.zeros((self._model.nv, self._model.nv))
         for slot in self._dynamics.tree.slots:
             match slot.freedom:
                 case Scalar(stiffness=k):
-                    found[slot.v, slot.v] -= k
+                    stiffness[slot.v, slot.v] -= k
                 case Ball(stiffness=k):
                     turn = rotation_vector(scalar_first(state.q[slot.q : slot.q + 4]))
-                    found[slot.v : slot.v + 3, slot.v : slot.v + 3] -= k * pin.Jlog3(pin.exp3(turn))
+                    stiffness[slot.v : slot.v + 3, slot.v : slot.v + 3] -= k * pin.Jlog3(pin.exp3(turn))
                 case Floating():
                     pass  # free flight has no spring
                 case _:
@@ -93,8 +93,8 @@ class PinocchioLinear:
             pin.computeJointJacobians(self._model, self._data, state.q)
             for joint, wrench in self._dynamics.loads.fixed_in_world(acting.t, self._data):
                 J = pin.getJointJacobian(self._model, self._data, joint, pin.ReferenceFrame.LOCAL)
-                found += J.T @ wrench @ J[3:]
-        return found
+                stiffness += J.T @ wrench @ J[3:]
+        return stiffness
 
     def _drag(self, state: TreeState) -> Real:
         """d tau/d v (nv,nv) of dampers."""

@@ -72,15 +72,15 @@ class RebuiltCase:
 
     def _ordered(self, joints):
         """Joints, parents before children."""
-        known, waiting, found = {"ground"}, list(joints), []
+        known, waiting, ordered = {"ground"}, list(joints), []
         while waiting:
             ready = [joint for joint in waiting if joint["parent"] in known]
             if not ready:
                 raise ValueError(f'no way leads from the ground to joint "{waiting[0]["name"]}"')
-            found += ready
+            ordered += ready
             known |= {joint["child"] for joint in ready}
             waiting = [joint for joint in waiting if joint not in ready]
-        return found
+        return ordered
 
     def _number(self):
         """Places of coordinates in q and of speeds in u, and the state at the start."""

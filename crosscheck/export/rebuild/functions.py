@@ -52,14 +52,14 @@ def function_of(data):
 
 def breaks_of(item):
     """Times at which functions of time inside the data are not smooth."""
-    found = set()
+    breaks = set()
     if isinstance(item, dict):
         if item.get("kind") in ("smooth_step", "pulse"):
-            found |= {item["start_s"], item["start_s"] + item["duration_s"]}
+            breaks |= {item["start_s"], item["start_s"] + item["duration_s"]}
         if item.get("kind") == "spin_up":
-            found.add(item["duration_s"])
+            breaks.add(item["duration_s"])
         item = list(item.values())
     if isinstance(item, list):
         for each in item:
-            found |= breaks_of(each)
-    return found
+            breaks |= breaks_of(each)
+    return breaks

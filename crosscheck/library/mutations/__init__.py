@@ -44,14 +44,14 @@ def mutate(scene: Scene, mutation: MutationKind, target: str) -> Scene:
 
 def applicable(scene: Scene, mutation: Mutation) -> list[MutationTarget]:
     """The targets of a scene that the mutation can change, including those without physical effect."""
-    found = []
+    targets = []
     for target in mutation.targets(scene):
         try:
             mutate(scene, mutation.name, target.name)
         except CaseError:
             continue
-        found.append(target)
-    return found
+        targets.append(target)
+    return targets
 
 
 __all__ = ["CATALOGUE", "Mutation", "MutationTarget", "applicable", "mutate"]

@@ -38,21 +38,21 @@ def _boosted(scene: Scene) -> Counterpart:
     left_out = {"momentum.angular"} | ({"work"} if any(load.type == "force" for load in scene.loads) else set())
 
     def back(times: Real, channels: Channels) -> Channels:
-        found = {name: rows for name, rows in channels.items() if name not in left_out}
+        restored = {name: rows for name, rows in channels.items() if name not in left_out}
         changes = {"gravity": mass * float(gravity @ BOOST_M_S) * times}
-        if "momentum.linear" in found:
-            momentum = found["momentum.linear"]
+        if "momentum.linear" in restored:
+            momentum = restored["momentum.linear"]
             changes["kinetic"] = 0.5 * mass * float(BOOST_M_S @ BOOST_M_S) - momentum @ BOOST_M_S
-            found["momentum.linear"] = momentum - mass * BOOST_M_S
+            restored["momentum.linear"] = momentum - mass * BOOST_M_S
         else:
-            found = {name: rows for name, rows in found.items() if name not in ("energy.kinetic", "energy.total")}
-        found = with_energy(found, changes)
-        for name, rows in found.items():
+            restored = {name: rows for name, rows in restored.items() if name not in ("energy.kinetic", "energy.total")}
+        restored = with_energy(restored, changes)
+        for name, rows in restored.items():
             if name.endswith(".position"):
-                found[name] = rows - times[:, None] * BOOST_M_S
+                restored[name] = rows - times[:, None] * BOOST_M_S
             elif name.endswith(".velocity"):
-                found[name] = rows - BOOST_M_S
-        return found
+                restored[name] = rows - BOOST_M_S
+        return restored
 
     hinges = tuple(_faster(each) if each.parent == GROUND else each for each in scene.hinges)
     return Counterpart(msgspec.structs.replace(scene, hinges=hinges), back)

@@ -85,12 +85,12 @@ def by_kind(
 
 def with_energy(channels: Channels, changes: dict[str, Real]) -> Channels:
     """Channels with (T,) added to kinds of energy, and to their total."""
-    found = dict(channels)
+    changed = dict(channels)
     for kind, change in changes.items():
-        if f"energy.{kind}" in found:
-            found[f"energy.{kind}"] = found[f"energy.{kind}"] + change[:, None]
-            found["energy.total"] = found["energy.total"] + change[:, None]
-    return found
+        if f"energy.{kind}" in changed:
+            changed[f"energy.{kind}"] = changed[f"energy.{kind}"] + change[:, None]
+            changed["energy.total"] = changed["energy.total"] + change[:, None]
+    return changed
 
 
 def product(a: Real, b: Real) -> Real:
@@ -113,18 +113,18 @@ def quaternion(values: Real) -> Quaternion:
 
 def total_mass(scene: Scene) -> float:
     """The total mass (kg); `NotApplicable` if that of a body is in a file."""
-    found = sum(wheel.mass_kg for wheel in scene.wheels) + sum(point.mass_kg for point in scene.point_masses)
+    mass = sum(wheel.mass_kg for wheel in scene.wheels) + sum(point.mass_kg for point in scene.point_masses)
     for body in scene.bodies:
         match body:
             case RigidBody():
-                found += body.mass_kg
+                mass += body.mass_kg
             case BeamBody():
                 x, density = np.array([(each.x_m, mass_per_length(each)) for each in body.stations]).T
-                found += float(np.trapezoid(density, x)) + sum(tip.mass_kg for tip in body.tip_masses)
+                mass += float(np.trapezoid(density, x)) + sum(tip.mass_kg for tip in body.tip_masses)
             case ModalBody() if body.points:
-                found += sum(point.mass_kg for point in body.points)
+                mass += sum(point.mass_kg for point in body.points)
             case ModalBody() | SidBody():
                 raise NotApplicable(f'body "{body.name}" keeps its mass in a file')
             case _:
                 assert_never(body)
-    return found
+    return mass

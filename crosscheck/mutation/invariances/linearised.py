@@ -47,17 +47,17 @@ class LinearRelation:
 
     def back(self, channels: Channels) -> Channels:
         """The channels of the linearised motion in the scene's own terms; others are left out."""
-        found = {}
+        restored = {}
         for name, rows in channels.items():
             if name in (FREQUENCIES, f"{KNOWN_TO}.{FREQUENCIES}"):
-                found[name] = rows * self.time
+                restored[name] = rows * self.time
             elif name.startswith("derivatives.") and self.scale is not None and self.place is not None:
                 n = len(self.scale)
                 whole = rows.reshape(-1, n, n)[:, self.place[:, None], self.place]
-                found[name] = (whole / self._factor(name.partition(".")[2], self.scale)).reshape(len(rows), -1)
+                restored[name] = (whole / self._factor(name.partition(".")[2], self.scale)).reshape(len(rows), -1)
             elif name.startswith(f"{KNOWN_TO}.") and self.scale is not None:  # of the norm of all entries
-                found[name] = rows / np.min(np.abs(self._factor(name.partition(".")[2], self.scale)), initial=np.inf)
-        return found
+                restored[name] = rows / np.min(np.abs(self._factor(name.partition(".")[2], self.scale)), initial=np.inf)
+        return restored
 
     def _factor(self, name: str, s: Real) -> Real:
         """(n,n) ratios of the counterpart's entries to the scene's."""
@@ -103,17 +103,17 @@ def by_freedom(
 ) -> list[float]:
     """Ratios of the displacements of an item: of scalar freedoms, the `int`-th of the item, of components of rotations
     and of displacements in carried axes. Prescribed ones have none."""
-    found, count = list[float](), 0
+    ratios, count = list[float](), 0
     for freedom, names in zip(item.freedoms, freedom_names(item), strict=True):
         match freedom:
             case ScalarFreedom():
-                found += [scalar(freedom, count)] * len(names)
+                ratios += [scalar(freedom, count)] * len(names)
                 count += 1
             case Ball():
-                found += turning
+                ratios += turning
             case Floating():
-                found += [*turning, *moving]
+                ratios += [*turning, *moving]
                 assert len(names) == 2 * len(ROTATION)
             case _:
                 assert_never(freedom)
-    return found
+    return ratios

@@ -157,14 +157,14 @@ def _signs(item: Hinge | PointMass | Wheel) -> list[float]:
 
     The mirror shows the axis of a turn as axial, that of a shift as polar; the item's own may be the opposite one.
     """
-    found = []
+    signs = []
     for own, image in zip(item.freedoms, _with_axes(item).freedoms, strict=True):
         if isinstance(own, ScalarFreedom) and isinstance(image, ScalarFreedom):
             if image.pitch != -own.pitch:
                 raise NotApplicable(f'hinge "{item.name}" has a hand, and no key that changes it')
             seen = _signed(own.axis, POLAR_SIGNS if own.motion == "slide" else AXIAL_SIGNS)
-            found.append(1.0 if np.dot(seen, image.axis) > 0.0 else -1.0)
-    return found
+            signs.append(1.0 if np.dot(seen, image.axis) > 0.0 else -1.0)
+    return signs
 
 
 def _value(key: str, value: Any) -> Any:

@@ -147,15 +147,15 @@ def _factor(channel: str, drives: dict[str, float]) -> float:
 def _drives(scene: Scene) -> dict[str, Any]:
     """Of hinges, wheels and point masses with prescribed motion, the factors of their drive loads; of connectors, of
     their loads."""
-    found: dict[str, Any] = {wheel.name: ENERGY.factor for wheel in scene.wheels}
+    factors: dict[str, Any] = {wheel.name: ENERGY.factor for wheel in scene.wheels}
     for item in (*scene.hinges, *scene.point_masses):
         prescribed = [each for _, each in coordinates(item) if each.prescribed is not None]
         if prescribed:
-            found[item.name] = [EFFORT[each.ANGULAR].factor for each in prescribed]
+            factors[item.name] = [EFFORT[each.ANGULAR].factor for each in prescribed]
     for connector in scene.connectors:
         if isinstance(connector, AlongHinge):
-            found[connector.name] = EFFORT[connector.ANGULAR].factor
-    return found
+            factors[connector.name] = EFFORT[connector.ANGULAR].factor
+    return factors
 
 
 def _in_units(item: Any) -> Any:

@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from crosscheck.judging.expectation import outside
+from crosscheck.judging.case_verdicts import outside
 from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.judging.question import Question
 from crosscheck.judging.verdict import Ending, Finding
