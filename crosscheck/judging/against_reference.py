@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from crosscheck.judging.entries import coordinates_of, with_worst_entry
-from crosscheck.judging.finer import finer_efforts
+from crosscheck.judging.finer_efforts import finer_efforts
 from crosscheck.judging.question import Question
 from crosscheck.judging.results import CaseResults, Result
 from crosscheck.judging.sizes import Sizes

@@ -9,7 +9,7 @@ import numpy as np
 from crosscheck.judging.against_reference import judge_reference
 from crosscheck.judging.basis import basis
 from crosscheck.judging.entries import coordinates_of, with_worst_entry
-from crosscheck.judging.finer import finer_efforts
+from crosscheck.judging.finer_efforts import finer_efforts
 from crosscheck.judging.question import Question
 from crosscheck.judging.results import CaseResults, Result
 from crosscheck.judging.verdict import SEVERITY, Finding, Verdict, compare, conserve, not_determined

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.text import Text
 
 from crosscheck.judging.figures import GROWTH
-from crosscheck.judging.finer import BEYOND
+from crosscheck.judging.finer_efforts import BEYOND
 from crosscheck.judging.outcome import NO_REFERENCE, SessionOutcome
 from crosscheck.judging.unjudged import grouped
 from crosscheck.judging.verdict import STATUSES, Verdict

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from copy import copy
 
-from flexmb.run.making import Making, system_at
+from flexmb.run.provenance import Making, system_at
 from flexmb.run.run_arrays import RunArrays
 from flexmb.scene.check.control import named
 from flexmb.system.system import System

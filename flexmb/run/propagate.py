@@ -22,8 +22,8 @@ from flexmb.motion import coordinates
 from flexmb.run.interruption import interruptible
 from flexmb.run.observing import Sampler, batch
 from flexmb.run.origin import Beginning
+from flexmb.run.restart_checks import refuse_other_division
 from flexmb.run.switching import clock_of
-from flexmb.run.taking_up import refuse_other_division
 from flexmb.scene.tree import watches_signals
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm, DynamicsAlgorithm, Route

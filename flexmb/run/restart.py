@@ -96,7 +96,7 @@ class Restart:
     def examined(self) -> Restart:
         """A copy, validated as far as possible without the system; ValueError or TypeError for invalid contents.
 
-        `flexmb.run.taking_up` checks whether it belongs to a system.
+        `flexmb.run.restart_checks` checks whether it belongs to a system.
         """
         self._refuse_other_parts()
         t, memory = _memory(self.method, self.t, self.memory)

@@ -12,9 +12,9 @@ import numpy as np
 from flexmb.integrate.control import ACCEPTED, REJECTED
 from flexmb.integrate.settings import Settings
 from flexmb.integrate.watch import Watch
+from flexmb.run.event_sides import Sides
 from flexmb.run.origin import Beginning
 from flexmb.run.propagate import Raw, integrate
-from flexmb.run.sides import Sides
 from flexmb.run.trajectory import Trajectory
 from flexmb.run.within_leaps import placed, too_near
 from flexmb.scene.events import EndRun

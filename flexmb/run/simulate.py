@@ -18,10 +18,10 @@ from flexmb.run.driver import Driver, Leg
 from flexmb.run.envelope import PartialEnvelope
 from flexmb.run.followed import FollowedRun, Stretch
 from flexmb.run.interruption import Interrupted
-from flexmb.run.making import Making
 from flexmb.run.origin import Given, Values, origin, start_time
 from flexmb.run.outputs import observed
 from flexmb.run.propagate import integration, unmoved
+from flexmb.run.provenance import Making
 from flexmb.run.restart import Restart
 from flexmb.run.run_arrays import Way, told
 from flexmb.run.samples import refuse_large_run, sample_times

@@ -17,8 +17,8 @@ from flexmb.run import exports
 from flexmb.run.at_outputs import systems_at
 from flexmb.run.envelope import Envelope, envelope
 from flexmb.run.joining import joined
-from flexmb.run.making import Making, error_estimate, has_made, system_at
 from flexmb.run.peaks import part_of
+from flexmb.run.provenance import Making, error_estimate, has_made, system_at
 from flexmb.run.run_arrays import MarkerPath, RunArrays, Way, refuse_torn
 from flexmb.scene.quaternions import quaternion_of
 from flexmb.system.load_axes import Axes

@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from flexmb.run.event_record import EventRecord
+from flexmb.run.event_sides import DIRECTIONS, Sides
 from flexmb.run.propagate import Raw
-from flexmb.run.sides import DIRECTIONS, Sides
 from flexmb.run.situation import Situation
 from flexmb.scene.events import Impact
 from flexmb.scene.schema import SceneEvent
