@@ -56,7 +56,7 @@ def write_summary(outcome: SessionOutcome, file: Path) -> None:
     if outcome.absences:
         lines += ["", "## What did not run to the end, and why", ""]
         for each in outcome.absences:
-            what = _flat(f"{each.case}, {each.variant}, {each.engine}{_role(each.role)}: {each.reason}")
+            what = _flat(f"{each.case}, {each.variant}, {each.engine}{role_words(each.role)}: {each.reason}")
             lines.append(f"- **{each.status}** {what}")
     if outcome.inapplicable:
         lines += ["", "## Not applicable", ""]
@@ -126,7 +126,8 @@ def _where(verdict: Verdict) -> tuple[str, str, str, str]:
     return _flat(verdict.case), _flat(verdict.comparison), _code(verdict.channel), _flat(verdict.pair)
 
 
-def _role(role: str) -> str:
+def role_words(role: str) -> str:
+    """The role of a run behind its engine, nothing for the main one."""
     return "" if role == "main" else f" ({role})"
 
 

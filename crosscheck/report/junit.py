@@ -18,6 +18,7 @@ from crosscheck.judging.outcome import NO_REFERENCE, SessionOutcome
 from crosscheck.judging.results import CaseResults, Key, Result, Session
 from crosscheck.judging.unjudged import grouped
 from crosscheck.judging.verdict import Verdict
+from crosscheck.report.ci import role_words
 from flexmb.output.printable import printable
 from flexmb.output.whole import whole_file
 
@@ -50,7 +51,7 @@ def write_junit(outcome: SessionOutcome, file: Path, session: Session = NO_SESSI
             for each, seconds in zip(verdicts, times, strict=True)
         ]
         for each in missing:
-            name = f"{each.variant} by {each.engine}{_role(each.role)} ran"
+            name = f"{each.variant} by {each.engine}{role_words(each.role)} ran"
             _failed(suite, case, name, each.status, each.reason)
         lost = [each for each in outcome.lost_controls if each.case == case]
         for control in lost:
@@ -199,7 +200,3 @@ def _runs_of(verdict: Verdict) -> list[Key]:
 def _seconds(result: Result) -> float:
     """Compiling once, and the solves of all efforts."""
     return max((run.compile_s for run in result.runs), default=0.0) + sum(run.wall_s for run in result.runs)
-
-
-def _role(role: str) -> str:
-    return "" if role == "main" else f" ({role})"

@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 
 from crosscheck.library.case import Variant
-from crosscheck.records.kinds import BrokenLine, Confirmed, Environment, RunStatus
+from crosscheck.records.kinds import Confirmed, Environment, RunStatus
 from crosscheck.running.execute import solve_job
 from crosscheck.running.job import Job
 from crosscheck.running.plan import variant_scene
@@ -48,7 +48,6 @@ class SampleRecord(
 
 
 Written = Environment | SampleRecord
-Read = Written | BrokenLine
 
 
 @dataclass(frozen=True)

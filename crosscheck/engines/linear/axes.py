@@ -15,6 +15,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from crosscheck.engines.conventions import cross_matrix
 from crosscheck.engines.linear.matrices import quaternion_transport
 from flexmb.typing import Real
 
@@ -66,7 +67,3 @@ def swapped_transport(u: Real, balls: Sequence[int], flying: Sequence[int]) -> R
     for j in flying:
         order[j : j + 6] = [*range(j + 3, j + 6), *range(j, j + 3)]
     return quaternion_transport(u[order], balls, flying)[np.ix_(order, order)]
-
-
-def cross_matrix(v: Real) -> Real:
-    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])

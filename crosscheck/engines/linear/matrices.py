@@ -25,6 +25,7 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.engines.conventions import cross_matrix
 from flexmb.typing import Real
 
 EPS = float(np.finfo(np.float64).eps)
@@ -93,12 +94,8 @@ def quaternion_transport(u: Real, turning: Sequence[int], moving: Sequence[int])
     of free flight at `moving`, followed by velocities."""
     transport = np.zeros((len(u), len(u)))
     for j in (*turning, *moving):
-        transport[j : j + 3, j : j + 3] = -_cross(u[j : j + 3])
+        transport[j : j + 3, j : j + 3] = -cross_matrix(u[j : j + 3])
     for j in moving:
-        transport[j + 3 : j + 6, j : j + 3] = -_cross(u[j + 3 : j + 6])
-        transport[j + 3 : j + 6, j + 3 : j + 6] = -_cross(u[j : j + 3])
+        transport[j + 3 : j + 6, j : j + 3] = -cross_matrix(u[j + 3 : j + 6])
+        transport[j + 3 : j + 6, j + 3 : j + 6] = -cross_matrix(u[j : j + 3])
     return transport
-
-
-def _cross(v: Real) -> Real:
-    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
