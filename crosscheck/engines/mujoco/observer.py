@@ -78,13 +78,13 @@ class MujocoObserver:
         The three rows of each point of a closure are along World's axes, of A less B; the only row of a coupling is its
         load.
         """
-        loads, start = {}, 0
+        loads, forces, start = {}, self._rows(data), 0
         for number, closed in enumerate(self._closures):
             loads[closed.name] = np.zeros(6)
             body = 0 if closed.b.link < 0 else self._tree.bodies[closed.b.link]
             place = data.xpos[body] + data.xmat[body].reshape(3, 3) @ closed.b.frame.position
             for _, site in closed.sites(number):
-                force = -self._rows(data)[start : start + 3]
+                force = -forces[start : start + 3]
                 torque = cross(data.site(site).xpos - place, force)
                 loads[closed.name] += np.concatenate([torque, force])
                 start += 3

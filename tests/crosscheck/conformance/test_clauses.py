@@ -12,8 +12,7 @@ import pytest
 
 from crosscheck.conformance import form
 from crosscheck.conformance.catalogue import CLAUSES, SHOWN
-from crosscheck.conformance.clause import ClauseBroken, equal, within
-from crosscheck.conformance.clause import told_apart
+from crosscheck.conformance.clause import ClauseBroken, equal, told_apart, within
 from crosscheck.conformance.form import FORM
 from crosscheck.conformance.samples import SAMPLES
 from crosscheck.conformance.trial import ClauseOutcome, ContractVerdict, to_offer, try_clause, verdict_on
