@@ -24,7 +24,7 @@ from flexmb.scene.tree import coordinates, with_coordinates
 from flexmb.system.compile import compile
 from flexmb.system.system import System
 from flexmb.system.watches import WAIVERS
-from flexmb.tables.state import State
+from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Real
 
 Item = TypeVar("Item", bound=Hinge | PointMass)
@@ -42,7 +42,7 @@ def closed(scene: Scene) -> Scene:
     try:
         system = compile(msgspec.structs.replace(scene, allow=(*scene.allow, *WAIVERS)), kernels="general")
         start = system.initial_state
-    except (ClosureError, NotImplementedError):
+    except (ClosureError, DynamicsError, NotImplementedError):
         return scene
     rough = system.scene_state(0.0)
     if _is_rounding(start.q, rough.q) and _is_rounding(start.u, rough.u):
