@@ -111,23 +111,16 @@ class SectionLoads:
 
         E times the strain of the fibre, N/EA + z My/EIy - y Mz/EIz where the section couples nothing.
         """
-        self._refuse_torn()
+        strain = self.strain
         E, y, z = arguments.number("E", E), arguments.number("y", y), arguments.number("z", z)
-        if self.stiffness is not None:
-            strain = self.strain
-            return E * (strain[..., 0] + z * strain[..., 4] - y * strain[..., 5])
-        bending = z * self.bending[..., 0] / self.EIy - y * self.bending[..., 1] / self.EIz
-        return E * (self.axial / self.EA + bending)
+        return E * (strain[..., 0] + z * strain[..., 4] - y * strain[..., 5])
 
     def torsion_stress(self, G: float, r: float) -> Real:
         """(...,X) Pa of shear at the radius r (m) of a round section or tube with shear modulus G (Pa): G r T / GJ.
 
         G r times the twist, where the section couples it with other strains.
         """
-        self._refuse_torn()
-        if self.stiffness is not None:
-            return arguments.number("G", G) * arguments.number("r", r) * self.strain[..., 3]
-        return arguments.number("G", G) * arguments.number("r", r) * self.torsion / self.GJ
+        return arguments.number("G", G) * arguments.number("r", r) * self.strain[..., 3]
 
 
 class AllLoads(NamedTuple):
