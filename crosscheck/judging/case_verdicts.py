@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -50,6 +51,7 @@ def _comparison(case: CaseResults, item: Comparison) -> Iterator[Verdict]:
             finding = compare(channel, one, other, wanted, scale)
             names = coordinates_of(case.case.variants.get(a.variant))
             finding = with_worst_entry(finding, channel, one.values, other.values, a.times, names)
+            finding = _with_surrogates(finding, a, b)
         beyond = outside(item, channel, finding) if finding.status == item.expect else ""
         advice = finer_efforts(case.case, channel, wanted, finding, (a, b))
         yield question.verdict(channel, goal, finding, beyond, advice)
@@ -57,6 +59,14 @@ def _comparison(case: CaseResults, item: Comparison) -> Iterator[Verdict]:
         patterns: dict[str, Iterable[str]] = {"scale": item.scales, "band": item.band}
         for pattern, finding in (*_unused(item.goals, patterns, a, b, case), *_vanished(question, item, a, b, case)):
             yield question.verdict(pattern, 0.0, finding, finding.reason)
+
+
+def _with_surrogates(finding: Finding, *results: Result) -> Finding:
+    """A difference names what an engine has another model of, as soft constraints: no effort takes that away."""
+    models = [f"{each.engine}: {each.finest.support}" for each in results if each.finest.support]
+    if finding.status != "differ" or not models:
+        return finding
+    return replace(finding, reason="; ".join((finding.reason, *models)))
 
 
 def _unused(

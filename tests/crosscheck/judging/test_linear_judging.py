@@ -68,6 +68,15 @@ def test_a_difference_beyond_both_accounts_differs_and_its_entry_is_told() -> No
     assert f"farthest apart, by 3e-06, is {where}" in verdict.reason
 
 
+def test_a_difference_names_the_models_that_stand_for_the_scene() -> None:
+    soft = [msgspec.structs.replace(run, support="loops are springs") for run in runs("two", matrix(3e-6), 1e-6, 1e-9)]
+    (verdict,) = judged(runs("one", matrix(), 1e-6, 1e-9), soft).all
+    assert verdict.status == "differ" and verdict.reason.endswith("; two: loops are springs")
+    near = [msgspec.structs.replace(run, support="loops are springs") for run in runs("two", matrix(1e-6), 1e-6, 1e-9)]
+    (verdict,) = judged(runs("one", matrix(), 1e-6, 1e-9), near).all
+    assert verdict.status == "agree" and "springs" not in verdict.reason
+
+
 def test_a_difference_within_the_accounts_agrees() -> None:
     (verdict,) = judged(runs("one", matrix(), 1e-6, 1e-9), runs("two", matrix(1e-6), 1e-6, 1e-9)).all
     assert verdict.status == "agree"
