@@ -82,7 +82,7 @@ def linear_model(equations: Equations, state: State) -> LinearModel:
     markers, seen = _markers(equations, at)
     everything = [*zip(names, units, strict=True), *speeds]
     chosen = np.r_[at.chosen, len(free) + at.chosen]
-    dependent = np.setdiff1d(np.arange(2 * len(free)), chosen)
+    dependent = np.delete(np.arange(2 * len(free)), chosen)
     states = tuple(everything[i] for i in chosen)
     C = np.vstack([np.eye(2 * n), at.by_chosen[dependent], seen])
     D = np.zeros((len(C), len(driven)))

@@ -27,6 +27,7 @@ from flexmb.closure.variation import ChainVariation
 from flexmb.entry import articulated
 from flexmb.entry.tangent import TangentWorkspace
 from flexmb.integrate.problem import Leaping, Linear
+from flexmb.kept import kept
 from flexmb.scene import schema as s
 from flexmb.scene.problems import SceneWarning
 from flexmb.system import algorithms
@@ -119,8 +120,12 @@ class Constraints:
             case "scene":
                 return asked(self._system, y)
             case "state":
-                return everything(self._system)
+                return self._everything
         assert_never(given)
+
+    @kept
+    def _everything(self) -> AskedFor:
+        return everything(self._system)
 
     def accelerations(self, state: State, algorithm: Algorithm = "articulated") -> Real:
         """udot (nu,) of the closed chain under all loads, at a state that closes all closures."""
