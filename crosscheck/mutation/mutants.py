@@ -13,7 +13,7 @@ from crosscheck.library.case import TAKES_APART, ComparisonSide, Control, Mutati
 from crosscheck.library.find import Case
 from crosscheck.library.mutations import CATALOGUE, applicable, mutate
 from crosscheck.mutation.subject import JudgedVariant, reduced
-from crosscheck.running.plan import at_level, variant_scene
+from crosscheck.running.plan import altered_scene, at_level, variant_scene
 from flexmb.scene.bodies import BeamBody, ModalBody
 from flexmb.scene.check import check_scene
 from flexmb.scene.schema import Scene
@@ -75,7 +75,7 @@ def _no_mutant(scene: Scene, kind: MutationKind, target: str, true: Scene, what:
         faulty = mutate(scene, kind, target)
         if _takes_apart(what, scene, faulty, target):
             return f'variant "{variant.name}" takes the body apart: it has no modes of the whole'
-        mutant = variant_scene(faulty, variant)
+        mutant = altered_scene(faulty, variant)
         check_scene(mutant, t_end=variant.duration_s or what.case.run.duration_s)
     except (ValueError, NotImplementedError, OSError) as error:
         return f"it makes no scene: {' '.join(str(error).split())}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import assert_never
@@ -108,6 +109,13 @@ def variant_scene(scene: Scene, variant: Variant, refined: Refined | None = None
     return _begun(_transformed(scene, variant), variant)
 
 
+def altered_scene(scene: Scene, variant: Variant) -> Scene:
+    """`variant_scene` of a scene that was mutated or has drawn values: what its start contradicts then is meant."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SceneWarning)
+        return variant_scene(scene, variant)
+
+
 def _transformed(scene: Scene, variant: Variant) -> Scene:
     match variant.transform:
         case "rigidify":
@@ -184,8 +192,9 @@ def _attempt(
         scene = case.scene(variant)
         if control is not None:  # the mutation changes the scene at the variant's level
             scene = mutate(at_level(scene, variant), control.mutation, control.target)
-            variant = msgspec.structs.replace(variant, level=None)
-        scene = variant_scene(scene, variant, refined)
+            scene = altered_scene(scene, msgspec.structs.replace(variant, level=None))
+        else:
+            scene = variant_scene(scene, variant, refined)
         check = check_and_warn if control is None else check_scene  # a mutated scene may be doubtful
         check(scene, t_end=variant.duration_s or case.run.duration_s)
         return scene, ""

@@ -13,7 +13,7 @@ from crosscheck.library.case import Variant
 from crosscheck.records.kinds import Confirmed, Environment, RunStatus
 from crosscheck.running.execute import solve_job
 from crosscheck.running.job import Job
-from crosscheck.running.plan import variant_scene
+from crosscheck.running.plan import altered_scene
 from crosscheck.running.rung import Solved
 from crosscheck.sampling.file import Reduction, SweepFile, SweptQuantity
 from crosscheck.sampling.values import with_values
@@ -95,7 +95,7 @@ def run_sample(sample: SampleJob, emit: Callable[[Any], None]) -> None:
 def _with_scene(sample: SampleJob) -> Job:
     """The job with its scene, or with the error if the values make the scene invalid."""
     try:
-        scene = variant_scene(with_values(sample.base, sample.sweep, sample.values), sample.variant)
+        scene = altered_scene(with_values(sample.base, sample.sweep, sample.values), sample.variant)
         check_scene(scene, t_end=float(sample.job.times[-1]))
     except (ValueError, NotImplementedError, OSError) as error:
         return replace(sample.job, error=str(error))

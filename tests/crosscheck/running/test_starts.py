@@ -162,6 +162,14 @@ def test_strictly_its_runs_are_errors(doubtful: Case, tmp_path: Path, capsys: py
     assert capsys.readouterr().err.count("warning: ") == 1
 
 
+def test_faults_whose_start_contradicts_what_they_couple_are_run_strictly_too(tmp_path: Path) -> None:
+    case = load_case(shipped_folder() / "closed_chains" / "geared_hoist")
+    with sole_writer(tmp_path, strict=True):
+        _, jobs = plan(case, (), PROVIDER)
+    faults = [job for job in jobs if job.role.startswith("control:")]
+    assert faults and not [job.error for job in faults if job.error]
+
+
 def rough_linkage(off: float) -> Scene:
     """A four-bar with a gear, whose crank's angle and rate are given; others are `off` (rad), and without rates."""
     tree = SceneBuilder("linkage", gravity=(0.0, -9.81, 0.0))
