@@ -45,6 +45,7 @@ HEAD = '''\
 Arguments are the keys of the struct without their unit, which is the SI unit that the docstring says.
 """
 
+from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Literal, Self
