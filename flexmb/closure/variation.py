@@ -24,7 +24,14 @@ from flexmb.closure.derivative_call import (
 from flexmb.closure.tables import Closed
 from flexmb.closure.tangent import ClosureTangentWorkspace, change_by_time, closure_tangent_workspace
 from flexmb.entry.tangent import TangentWorkspace
-from flexmb.entry.variation import ByAllDirections, CoordinateMotion, FreeVariation, RowChanges, Stiffness
+from flexmb.entry.variation import (
+    ByAllDirections,
+    CoordinateMotion,
+    FreeVariation,
+    RowChanges,
+    Stiffness,
+    VariedAccelerations,
+)
 from flexmb.jit.direct import Direct, direct
 from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR
 from flexmb.kept import kept
@@ -59,12 +66,11 @@ class ChainVariation:
 
     def at(self, t: float, y: Real) -> FreeVariation:
         """At y = [q, u, work], which must fulfil the closures; DynamicsError where these are singular."""
+        found = self._differentiated(t, y)
         s, x = self._chain, self._x
-        self._closures.expect_rows(s)
-        self._closures.check(self._differentiate(t, y), int(x.fault[0]))
         changes, place = x.chain.changes, x.chain.tree.tables.place
         nu, chosen = len(place), self._closures.chosen_in(s)
-        rates, J, rate = x.speed["acceleration"].copy(), changes.jacobian[:, place], changes.rate[:, place]
+        J, rate = changes.jacobian[:, place], changes.rate[:, place]
         of_loads = changes.load[:, place], changes.load[:, nu + place], x.load_by_force[:, place]
         for part in (rate, *of_loads):
             part[:, self._held] = 0.0
@@ -73,9 +79,25 @@ class ChainVariation:
             s.cw.row["load"].copy(), ByAllDirections(*of_loads, none), chosen, x.unit[place, : len(chosen)], J, rate,
             none,
         )  # fmt: skip
-        of_rates = ByAllDirections(x.by_displacement.copy(), x.by_speed.copy(), x.by_force.copy(), np.zeros(nu))
-        found = FreeVariation(rates, of_rates, self.motion.at(t, y), rows)
-        return self._with_time(t, y, found) if len(s.c.function) else found
+        whole = FreeVariation(*found, rows)
+        return self._with_time(t, y, whole) if len(s.c.function) else whole
+
+    def of_accelerations(self, t: float, y: Real) -> VariedAccelerations:
+        """The same without the rows, which functions of time alone need for the accelerations."""
+        if len(self._chain.c.function):
+            return VariedAccelerations(*self.at(t, y)[:3])
+        return self._differentiated(t, y)
+
+    def _differentiated(self, t: float, y: Real) -> VariedAccelerations:
+        """The same with functions of time held at their values; the rows are then in the tables."""
+        x = self._x
+        self._closures.expect_rows(self._chain)
+        self._closures.check(self._differentiate(t, y), int(x.fault[0]))
+        rates = x.speed["acceleration"].copy()
+        of_rates = ByAllDirections(
+            x.by_displacement.copy(), x.by_speed.copy(), x.by_force.copy(), np.zeros(len(rates))
+        )
+        return VariedAccelerations(rates, of_rates, self.motion.at(t, y))
 
     @kept
     def _stiffen(self) -> Direct:

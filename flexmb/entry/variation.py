@@ -67,12 +67,20 @@ class RowChanges(NamedTuple):
         return found
 
 
-class FreeVariation(NamedTuple):
-    """The accelerations (nu,) of a free motion with their derivatives, and the rows of closures.
+class VariedAccelerations(NamedTuple):
+    """The accelerations (nu,) of a free motion with their derivatives.
 
     motion (nq,nu): N = d(qdot)/du, the change of the coordinates by displacements along the speeds. Columns of
-    prescribed coordinates and speeds vanish, but those of J.
+    prescribed coordinates and speeds vanish.
     """
+
+    accelerations: Real
+    of_accelerations: ByAllDirections
+    motion: Real
+
+
+class FreeVariation(NamedTuple):
+    """The same, and the rows of closures; of the columns of these only those of J do not vanish."""
 
     accelerations: Real
     of_accelerations: ByAllDirections
@@ -139,17 +147,19 @@ class TreeVariation:
 
     def at(self, t: float, y: Real) -> FreeVariation:
         """At y = [q, u, work]; DynamicsError where the accelerations do not exist."""
+        return FreeVariation(*self.of_accelerations(t, y), self._no_rows)
+
+    def of_accelerations(self, t: float, y: Real) -> VariedAccelerations:
+        """The same without rows."""
         nu = len(self._w.sweeps.u)
-        by_state_and_force = tuple(np.empty((nu, nu)) for _ in range(3))
+        by_state_and_force = np.empty((nu, nu)), np.empty((nu, nu)), np.empty((nu, nu))
         self._check(self._differentiate(t, y, *by_state_and_force), int(self._w.fault[0]))
         rates, by_time = self._w.sweeps.speed["acceleration"].copy(), np.zeros(nu)
         if self._is_driven:
             drift = np.empty_like(y)
             self._check(self._differentiate_by_time(t, y, drift), int(self._dual.fault[0]))
             by_time = drift[-1 - nu : -1]
-        of_rates = ByAllDirections(*by_state_and_force, by_time)
-        return FreeVariation(rates, of_rates, self.motion.at(t, y), self._no_rows)
-
+        return VariedAccelerations(rates, ByAllDirections(*by_state_and_force, by_time), self.motion.at(t, y))
 
     @kept
     def _stiffen(self) -> Direct:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import numpy as np
 
 from flexmb.entry.derivatives import inverse_dynamics_derivatives
-from flexmb.entry.variation import ByAllDirections, FreeVariation, TreeVariation
+from flexmb.entry.variation import ByAllDirections, FreeVariation, TreeVariation, VariedAccelerations
 from flexmb.jit.direct import Direct, direct
 from flexmb.jit.pointer import MATRIX, REAL, VECTOR, VOID
 from flexmb.kept import kept
@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from flexmb.system.constraints import Constraints
 
 _Four = TypeVar("_Four", OfFreeMotion, OfGivenMotion)
+_Varied = TypeVar("_Varied", FreeVariation, VariedAccelerations)
 INSTEAD = "have the controllers chained through by flexmb.ControlledMotion(scene)"
 
 
@@ -60,9 +61,10 @@ class Linearisation:
     def of_accelerations(self, state: State, forces: Real | None) -> AccelerationDerivatives:
         """See `System.acceleration_derivatives`."""
         t, y = self._differentiable(state, "system.acceleration_derivatives")
-        at = self._variation(t, y)
-        if forces is not None:
-            at = self._under_forces(at, t, y, self._system.layout.rates("forces", forces))
+        if forces is None:
+            at = self._sound(t, y, self._variations.of_accelerations(t, y))
+        else:
+            at = self._under_forces(self._variation(t, y), t, y, self._system.layout.rates("forces", forces))
         return AccelerationDerivatives(at.accelerations, *at.of_accelerations, at.motion)
 
     def evaluator(self) -> DerivativeEvaluator:
@@ -130,7 +132,10 @@ class Linearisation:
 
     def _variation(self, t: float, y: Real) -> FreeVariation:
         """How the free motion changes."""
-        found = self._variations.at(t, y)
+        return self._sound(t, y, self._variations.at(t, y))
+
+    def _sound(self, t: float, y: Real, found: _Varied) -> _Varied:
+        """The motion itself; a warning or DynamicsError where rounding leaves few digits or numbers overflow."""
         self._system.check_precision(t, y, self._variations)
         for part in (found.accelerations, *found.of_accelerations):  # loads of rows that overflow overflow these
             finite_result(part, t)
