@@ -40,30 +40,50 @@ def consistent(closures: Closures, t: float, y: Real, asked: AskedFor = NOTHING_
     If these cannot be kept, the nearest closed state. ClosureError if there is none, or if values that the scene marks
     as given cannot be kept.
     """
-    y = _as_asked(closures, t, y.copy(), asked.coordinates, asked, _closed, _gaps)
-    closures.linearise(t, y)
+    start = y.copy()
+    closures.linearise(t, start)
+    y = _as_asked(closures, t, start, asked.coordinates, asked, _closed, _gap)
+    if y is not start:
+        closures.linearise(t, y)
     closures.count_rows()
     _refuse_half_a_turn(closures)
-    return _as_asked(closures, t, y, asked.speeds, asked, _moving, _rates)
+    return _as_asked(closures, t, y, asked.speeds, asked, _moving, _rate)
+
+
+class Opening(NamedTuple):
+    """How far closures are from closed, relative to their sizes or to the speeds of their ports; and, of speeds, the
+    largest rate of a row, beside which smaller ones are small even where nothing else moves."""
+
+    relative: float
+    rate: float = 0.0
+
+    def beside(self, before: Opening) -> float:
+        """What is left of the opening before."""
+        return min(self.relative, self.rate / before.rate) if before.rate > 0.0 else self.relative
 
 
 Closing = Callable[[Closures, float, Real, KeptValues], Real]
-Opening = Callable[[Closures, float, Real, Real], float]
 
 
 def _as_asked(
-    closures: Closures, t: float, y: Real, wishes: Wishes, asked: AskedFor, closing: Closing, opening: Opening
-) -> Real:
-    """The result of `closing`, which takes the values to hold and may raise ClosureError.
+    closures: Closures, t: float, y: Real, wishes: Wishes, asked: AskedFor, closing: Closing,
+    opening: Callable[[Closures], Opening],
+) -> Real:  # fmt: skip
+    """The result of `closing`, which takes the values to hold and may raise ClosureError; y itself if it is closed.
 
-    `opening`: how far a state y is from closed, relative to another state.
+    y is the state linearised last; `opening`: of that state.
     """
-    if opening(closures, t, y, y) <= CLOSED:
+    first = opening(closures)
+    if first.relative <= CLOSED:
         return y
     for hold, is_wished in _holds(wishes, asked):
         kept = _unless_turned(closures, t, y, hold, closing)
-        if kept is None or (is_wished and opening(closures, t, kept, y) > NEARLY_CLOSED):
+        if kept is None:
             continue
+        if is_wished:
+            closures.linearise(t, kept)
+            if opening(closures).beside(first) > NEARLY_CLOSED:
+                continue
         if wishes.insisted and asked.is_marked and not is_wished:
             names = ", ".join(f'"{asked.name(each)}"' for each in wishes.insisted)
             raise ClosureError(
@@ -300,18 +320,13 @@ def _refuse_half_a_turn(closures: Closures) -> None:
             )
 
 
-def _gaps(closures: Closures, t: float, y: Real, _: Real) -> float:
-    closures.linearise(t, y)
-    return _largest(closures.errors())
+def _gap(closures: Closures) -> Opening:
+    return Opening(_largest(closures.errors()))
 
 
-def _rates(closures: Closures, t: float, y: Real, before: Real) -> float:
-    """How fast closures open, relative to the present speeds or, at rest, to the speeds that were removed."""
-    closures.linearise(t, before)
-    taken = _largest(closures.rates()[0])
-    closures.linearise(t, y)
+def _rate(closures: Closures) -> Opening:
     rates, largest = closures.rates()
-    return min(largest, _largest(rates) / taken) if taken > 0.0 else largest
+    return Opening(largest, _largest(rates))
 
 
 def _largest(errors: Real) -> float:

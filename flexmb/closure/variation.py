@@ -72,8 +72,9 @@ class ChainVariation:
         nu, chosen = len(place), self._closures.chosen_in(s)
         J, rate = changes.jacobian[:, place], changes.rate[:, place]
         of_loads = changes.load[:, place], changes.load[:, nu + place], x.load_by_force[:, place]
-        for part in (rate, *of_loads):
-            part[:, self._held] = 0.0
+        if len(self._held):
+            for part in (rate, *of_loads):
+                part[:, self._held] = 0.0
         none = np.zeros(len(J))
         rows = RowChanges(
             s.cw.row["load"].copy(), ByAllDirections(*of_loads, none), chosen, x.unit[place, : len(chosen)], J, rate,
@@ -94,9 +95,7 @@ class ChainVariation:
         self._closures.expect_rows(self._chain)
         self._closures.check(self._differentiate(t, y), int(x.fault[0]))
         rates = x.speed["acceleration"].copy()
-        of_rates = ByAllDirections(
-            x.by_displacement.copy(), x.by_speed.copy(), x.by_force.copy(), np.zeros(len(rates))
-        )
+        of_rates = ByAllDirections(x.by_displacement.copy(), x.by_speed.copy(), x.by_force.copy(), np.zeros(len(rates)))
         return VariedAccelerations(rates, of_rates, self.motion.at(t, y))
 
     @kept

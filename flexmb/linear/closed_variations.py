@@ -18,13 +18,13 @@ from __future__ import annotations
 from typing import NamedTuple, cast
 
 import numpy as np
-from scipy.linalg import qr, solve_triangular
 
 from flexmb.closure.assembly import consistent
 from flexmb.closure.closures import ClosureError, Closures
 from flexmb.closure.factor import DEPENDENT
 from flexmb.closure.tables import ClosureConstants
 from flexmb.closure.variation import ChainVariation
+from flexmb.linear.triangular import backward, forward, pivots
 from flexmb.linear.variations import Equations, RestForces, Variations, same_structure
 from flexmb.system.pushforward import GivenMotion
 from flexmb.system.system import System
@@ -44,8 +44,7 @@ class _Freedom(NamedTuple):
     def independent(self) -> Index:
         """Indices (f,) of the independent coordinates."""
         weighed = np.sqrt(np.diag(self.mass))[:, None] * self.null
-        order: Index = qr(weighed.T, mode="r", pivoting=True)[1]
-        return np.sort(order[: self.null.shape[1]])
+        return np.sort(pivots(weighed.T)[: self.null.shape[1]])
 
     def basis(self, chosen: Index) -> Real:
         """N (n,f) for the chosen coordinates; LinAlgError if they are not independent."""
@@ -57,9 +56,7 @@ class ClosedEquations(Equations):
 
     _root: ClosedEquations
 
-    def __init__(
-        self, system: System, constants: Constants | None = None, like: ClosedEquations | None = None
-    ) -> None:
+    def __init__(self, system: System, constants: Constants | None = None, like: ClosedEquations | None = None) -> None:
         super().__init__(system, constants, like)
         closures = system.closures
         assert closures is not None  # of a closed chain
@@ -112,8 +109,8 @@ class ClosedEquations(Equations):
         return chosen, left.basis(chosen)
 
     def variations(self, state: State) -> Variations:
-        found, free = self.free_variation(state), self.free
-        of_rates, by_displacement = found.of_accelerations, self._among_free(found.of_accelerations.by_displacement)
+        found, free, both = self.free_variation(state), self.free, self._among_free
+        of_rates, by_displacement = found.of_accelerations, found.of_accelerations.by_displacement[both]
         J, rates_by_displacement = found.rows.J[:, free], found.rows.rates_by_displacement[:, free]
         P = found.rows.lever[free]
         left = self._freedom(self.mass(state), J)
@@ -127,14 +124,16 @@ class ClosedEquations(Equations):
         T = dependent(-P @ rates_by_displacement @ N)
         carried = dependent(P @ J @ state.u[free])  # displacement per second by prescribed motions
         hurried = dependent(-P @ (found.rows.rates_by_time + rates_by_displacement @ carried))
-        by_speed = self._among_free(of_rates.by_speed)
+        by_speed = of_rates.by_speed[both]
+        by_chosen = np.zeros((2 * n, 2 * f))
+        by_chosen[:n, :f] = by_chosen[n:, f:] = N
+        by_chosen[n:, :f] = T
         return Variations(
-            state, found.accelerations[free][chosen],
+            state, found, found.accelerations[free][chosen],
             (by_displacement @ N + by_speed @ T)[chosen], (by_speed @ N)[chosen],
             (of_rates.by_time[free] + by_displacement @ carried + by_speed @ hurried)[chosen],
             self._transport(state.u)[chosen] @ N, found.motion[:, free] @ N, N.T @ left.mass @ N, chosen,
-            self.movable(chosen),
-            np.block([[N, np.zeros((n, f))], [T, N]]),
+            self.movable(chosen), by_chosen,
         )  # fmt: skip
 
     def moved(self, at: Variations | RestForces, xi: Real) -> State:
@@ -146,19 +145,15 @@ class ClosedEquations(Equations):
 
     def on_functions(self, state: State) -> State:
         """As for a tree, with coordinates and speeds that fulfil the closures; ClosureError if there are none."""
-        y = consistent(self._closures, state.t, pack(super().on_functions(state)))
-        return State(y[: self.system.nq], y[self.system.nq : -1], state.t, self.system.layout)
-
-    def _among_free(self, of_all: Real) -> Real:
-        """Rows and columns (n,n) of the free speeds."""
-        return of_all[np.ix_(self.free, self.free)]
+        found = super().on_functions(state)
+        return self.system.layout.known(state.t, consistent(self._closures, state.t, found.kernel_y))
 
     def _freedom(self, mass: Real, J: Real) -> _Freedom:
         """DynamicsError at a singular position."""
         rank = self.rank
         weight = self._closures.constants[1].weight  # of rotations against translations
         root = np.linalg.cholesky(mass)
-        _, S, Vt = np.linalg.svd(weight[:, None] * solve_triangular(root, J.T, lower=True).T)
+        _, S, Vt = np.linalg.svd(weight[:, None] * forward(root, J.T).T)
         if rank and not S[rank - 1] > DEPENDENT * S[0]:
             raise DynamicsError("the closures suppress fewer motions here than elsewhere: a singular position")
-        return _Freedom(mass, solve_triangular(root.T, Vt[rank:].T, lower=False))
+        return _Freedom(mass, backward(root, Vt[rank:].T))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -118,32 +118,30 @@ class LinearModel:
     drift: Real
 
     def __post_init__(self) -> None:
-        self._refuse_torn()
-        # The row of an undetermined output is NaN as a whole: a NaN beside numbers is a fault.
-        determined = ~np.all(np.isnan(np.column_stack([np.asarray(getattr(self, name), float) for name in "CD"])), 1)
-        for name in self._shapes:
-            own = np.array(getattr(self, name), float)
-            arguments.finite(name, np.where(determined[:, None], own, 0.0) if name in "CD" else own)
-            own.flags.writeable = False
-            object.__setattr__(self, name, own)
+        own = {name: np.array(getattr(self, name), float) for name in self._refuse_torn()}
+        if not np.isfinite(np.concatenate([array.ravel() for array in own.values()])).all():
+            # The row of an undetermined output is NaN as a whole: a NaN beside numbers is a fault.
+            determined = ~np.all(np.isnan(np.hstack([own["C"], own["D"]])), 1)
+            for name, array in own.items():
+                arguments.finite(name, np.where(determined[:, None], array, 0.0) if name in "CD" else array)
+        for array in own.values():
+            array.flags.writeable = False
+        self.__dict__.update(own)
 
-    @property
-    def _shapes(self) -> dict[str, tuple[int, ...]]:
-        """The shapes of all arrays."""
-        x, f, y = len(self.states), len(self.inputs), len(self.outputs)
-        n, nq = len(self.rates), len(self.state.q)
-        return {
-            "A": (x, x), "B": (x, f), "C": (y, x), "D": (y, f), "mass": (n, n), "motion": (nq, n), "rates": (n,),
-            "drift": (n,),
-        }  # fmt: skip
-
-    def _refuse_torn(self) -> None:
-        """TypeError or ValueError if the parts do not fit together."""
+    def _refuse_torn(self) -> Iterable[str]:
+        """The names of all arrays; TypeError or ValueError if the parts do not fit together."""
         if not isinstance(self.state, State):
             raise TypeError(f"state is a {type(self.state).__name__}: give a State")
         arguments.held("rates", self.rates, (None,))
-        for name, shape in self._shapes.items():
+        x, f, y = len(self.states), len(self.inputs), len(self.outputs)
+        n, nq = len(self.rates), len(self.state.kernel_q)
+        shapes = {
+            "A": (x, x), "B": (x, f), "C": (y, x), "D": (y, f), "mass": (n, n), "motion": (nq, n), "rates": (n,),
+            "drift": (n,),
+        }  # fmt: skip
+        for name, shape in shapes.items():
             arguments.held(name, getattr(self, name), shape)
+        return shapes
 
     @property
     def displacements(self) -> tuple[str, ...]:

@@ -10,15 +10,11 @@ from flexmb.linear.equations import built, entering
 from flexmb.linear.linear_model import LinearModel
 from flexmb.linear.variations import Equations, Variations
 from flexmb.scene.schema import Scene
-from flexmb.system.pushforward import Directions
+from flexmb.system.pushforward import Directions, GivenMotion
 from flexmb.system.system import System
 from flexmb.system.watches import WatchedStates, of_states, warn
-from flexmb.tables.state import DynamicsError, State
+from flexmb.tables.state import State, finite_result
 from flexmb.typing import Real
-
-_ROTATION = tuple((f"rotation.{axis}", "rad") for axis in "xyz")
-_POSITION = tuple((f"position.{axis}", "m") for axis in "xyz")
-_FORCE = {"rad/s": "N m", "m/s": "N", "1/s": "1"}
 
 
 def linearize(system: System | Scene, state: State | None = None, *, held: bool = False) -> LinearModel:
@@ -71,78 +67,44 @@ def held_model(equations: Equations, state: State) -> LinearModel:
 
 def linear_model(equations: Equations, state: State) -> LinearModel:
     """The model of equations whose functions of time are already held or replaced as wanted, at a state on these."""
-    system, free = equations.system, equations.free
+    system, labels = equations.system, equations.labels
     system.refuse_corners(*system.layout.entering(state))
-    at, n = equations.variations(state), equations.freedom
-    names, units = displacement_names(equations)
-    speeds = [system.state_names[1][j] for j in free]
-    driven = _driven(equations)
+    at, n, every = equations.variations(state), equations.freedom, len(equations.free)
+    A, driven = finite_result(at.A, state.t), labels.driven
+    for part in (at.drift, at.rates):
+        finite_result(part, state.t)
     B = np.zeros((2 * n, len(driven)))
     B[n:] = np.linalg.solve(at.mass, at.basis[driven].T)
-    markers, seen = _markers(equations, at)
-    everything = [*zip(names, units, strict=True), *speeds]
-    chosen = np.r_[at.chosen, len(free) + at.chosen]
-    dependent = np.delete(np.arange(2 * len(free)), chosen)
-    states = tuple(everything[i] for i in chosen)
-    C = np.vstack([np.eye(2 * n), at.by_chosen[dependent], seen])
+    is_state = np.zeros(2 * every, bool)
+    is_state[at.chosen] = is_state[every + at.chosen] = True
+    names, markers = (*labels.displacements, *labels.speeds), labels.markers
+    states, dependent = (tuple(names[i] for i in np.flatnonzero(among).tolist()) for among in (is_state, ~is_state))
+    C = np.vstack([np.eye(2 * n), at.by_chosen[~is_state], _markers(equations, at)])
     D = np.zeros((len(C), len(driven)))
     if system.scene.sensors:
         from flexmb.linear.sensed import of_sensors  # imported only for scenes with sensors
 
         sensors = of_sensors(equations, at)
         C, D = np.vstack([C, sensors.by_state]), np.vstack([D, sensors.by_force[:, driven]])
-        markers += sensors.names
-    if not all(np.isfinite(part).all() for part in (at.A, at.drift, at.rates)):
-        raise DynamicsError("derivatives are not finite: coordinates or speeds are so large that products overflow")
+        markers = (*markers, *sensors.names)
     return LinearModel(
-        scene=system.scene.name, state=state, states=states,
-        inputs=tuple((names[i], _FORCE[speeds[i][1]]) for i in driven),
-        outputs=(*states, *(everything[i] for i in dependent), *markers),
-        A=at.A, B=B, C=C, D=D,
+        scene=system.scene.name, state=state, states=states, inputs=labels.inputs,
+        outputs=(*states, *dependent, *markers), A=A, B=B, C=C, D=D,
         mass=at.mass, motion=at.motion, rates=at.rates, drift=at.drift,
     )  # fmt: skip
 
 
-def displacement_names(equations: Equations) -> tuple[list[str], list[str]]:
-    """Names and units of xi: those of the coordinates, "<hinge>.rotation.x" and "<hinge>.position.x" of quaternions."""
-    system = equations.system
-    named = [("", "")] * system.nu
-    coordinates = system.state_names[0]
-    for j, speed in enumerate(equations.constants.speed):
-        if speed["coordinate"] >= 0:
-            named[j] = coordinates[speed["coordinate"]]
-    for name, body in zip(system.body_names, equations.constants.body, strict=True):
-        modes = slice(int(body["etad_index"]), int(body["etad_index"] + body["modes"]))
-        named[modes] = coordinates[int(body["eta_index"]) : int(body["eta_index"] + body["modes"])]
-        if body["quaternion"] >= 0:
-            hinge = next(hinge.name for hinge in system.scene.hinges if hinge.child == name)
-            labels = _ROTATION if body["quaternion"] == body["q_index"] else _ROTATION + _POSITION
-            j = int(body["u_index"])
-            named[j : j + len(labels)] = [(f"{hinge}.{label}", unit) for label, unit in labels]
-    chosen = [named[j] for j in equations.free]
-    return [name for name, _ in chosen], [unit for _, unit in chosen]
-
-
-def _driven(equations: Equations) -> list[int]:
-    """Indices among the free speeds of those that a motor can drive: all but the modal ones."""
-    modal = np.zeros(equations.system.nu, bool)
-    for body in equations.constants.body:
-        modal[int(body["etad_index"]) : int(body["etad_index"] + body["modes"])] = True
-    return np.flatnonzero(~modal[equations.free]).tolist()
-
-
-def _markers(equations: Equations, at: Variations) -> tuple[list[tuple[str, str]], Real]:
-    """Names and rows (6 K, 2f): displacement and rotation of markers by xi, from velocities, which are linear in u."""
+def _markers(equations: Equations, at: Variations) -> Real:
+    """(6 K, 2f) displacement and rotation of markers by xi, from velocities, which are linear in u and do not depend on
+    accelerations and loads."""
     system, state, n = equations.system, at.state, equations.freedom
-    labels = [*zip("xyz", "mmm", strict=True), *_ROTATION]
-    names = [(f"{marker.name}.{label}", unit) for marker in system.scene.markers for label, unit in labels]
-    rows = np.zeros((len(names), 2 * n))
-    if names:
-        speeds = np.zeros((system.nq + system.nu, n))
+    rows = np.zeros((len(equations.labels.markers), 2 * n))
+    if len(rows):
+        speeds, nu, loads = np.zeros((system.nq + system.nu, n)), system.nu, len(at.free.rows.loads)
         speeds[system.nq + equations.free] = at.basis
-        push, motion = equations.pushforward, equations.motion(state)
-        still = Directions(speeds, np.zeros((system.nu, n)), np.zeros((len(motion.loads), n)), np.zeros(n))
+        push, motion = equations.pushforward, GivenMotion(state.t, state.kernel_y, np.zeros(nu), np.zeros(loads))
+        still = Directions(speeds, np.zeros((nu, n)), np.zeros((loads, n)), np.zeros(n))
         place, shape = system.observation.columns["markers"]
-        change = push.derivatives(motion, still, push.row)[place].reshape(*shape, n)
-        rows[:, :n] = np.concatenate([change[:, 15:18], change[:, 12:15]], axis=1).reshape(len(names), n)
-    return names, rows
+        change = push.derivatives(motion, still, lambda lanes: push.out.every[place, lanes]).reshape(*shape, n)
+        rows[:, :n] = np.concatenate([change[:, 15:18], change[:, 12:15]], axis=1).reshape(len(rows), n)
+    return rows

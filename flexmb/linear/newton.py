@@ -14,10 +14,10 @@ from __future__ import annotations
 from typing import Literal, NamedTuple
 
 import numpy as np
-from scipy.linalg import eigvals, solve_triangular
+from scipy.linalg import eigvals
 
 from flexmb.linear.linear_model import Complex
-from flexmb.linear.linearize import displacement_names
+from flexmb.linear.triangular import backward, forward
 from flexmb.linear.variations import Equations, RestForces
 from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Real
@@ -169,23 +169,23 @@ class _Linearised:
         M, moving = at.mass, at.movable
         self.at, self._moving = at, moving
         self._root, self._own = np.linalg.cholesky(M), np.linalg.cholesky(M[np.ix_(moving, moving)])
-        half = solve_triangular(self._own, at.stiffness[:, moving].T, lower=True).T
-        U, values, Vt = np.linalg.svd(solve_triangular(self._root, half, lower=True), full_matrices=False)
+        half = forward(self._own, at.stiffness[:, moving].T).T
+        U, values, Vt = np.linalg.svd(forward(self._root, half), full_matrices=False)
         self.stiffness = float(values[0]) if len(values) else 0.0
         kept = values > RANK * self.stiffness
         self._U, self._back = U[:, kept], Vt[kept].T / values[kept]
         self.scale = float(np.sqrt(np.trace(M)))
-        self.settling = _is_settling(solve_triangular(self._own, half[moving], lower=True))
-        z = solve_triangular(self._root, at.load, lower=True)
+        self.settling = _is_settling(forward(self._own, half[moving]))
+        z = forward(self._root, at.load)
         self.size, self.left = float(np.linalg.norm(z)), float(np.linalg.norm(z - self._U @ (self._U.T @ z)))
         self._along = self.correction(at.load)
         self.length = float(np.linalg.norm(self._along))
         self.step = np.zeros(len(z))
-        self.step[moving] = solve_triangular(self._own.T, self._along, lower=False)
+        self.step[moving] = backward(self._own, self._along)
 
     def correction(self, load: Real) -> Real:
         """The step that removes a load (n,) as far as the tangent here says, in orthonormal coordinates."""
-        z = solve_triangular(self._root, load, lower=True)
+        z = forward(self._root, load)
         return np.asarray(self._back @ (self._U.T @ z))
 
     def strays(self, factor: float, load: Real) -> float:
@@ -230,7 +230,7 @@ def verdict(squares: Complex) -> Stability:
 def _report(equations: Equations, at: RestForces) -> str:
     """The error message: which acceleration remains, where, and the remedy."""
     left, now = at.mass @ at.rates, _Linearised(at)
-    names, _ = displacement_names(equations)
+    names = [name for name, _ in equations.labels.displacements]
     worst = int(np.argmax(np.abs(left)))
     try:
         ahead = LONGEST * now.scale / max(now.length, LONGEST * now.scale)

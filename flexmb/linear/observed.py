@@ -29,7 +29,7 @@ class ObservedTangent(NamedTuple):
 def observed(equations: Equations, at: Variations) -> ObservedTangent:
     """The observed row and its derivatives at the state of `at`; DynamicsError where accelerations do not exist."""
     state, free, n = at.state, equations.free, len(equations.free)
-    found, push = equations.free_variation(state), equations.pushforward
+    found, push = at.free, equations.pushforward
     xi, du = at.by_chosen[:n], at.by_chosen[n:]
     of_rates, of_loads = (
         np.hstack([of.by_displacement[:, free] @ xi + of.by_speed[:, free] @ du, of.by_force[:, free]])

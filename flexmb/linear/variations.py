@@ -15,7 +15,7 @@ speeds and w, v those of a free or spherical hinge,
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -24,6 +24,8 @@ from flexmb.entry import articulated
 from flexmb.entry.derivatives import DerivativeWorkspace, derivative_workspace
 from flexmb.entry.tangent import TangentWorkspace, tangent_workspace
 from flexmb.entry.variation import FreeVariation, TreeVariation
+from flexmb.kept import kept
+from flexmb.linear.labels import ModelLabels, model_labels
 from flexmb.scene.functions import Constant, Function, Ramp
 from flexmb.system.pushforward import GivenMotion, Pushforward, pushforward
 from flexmb.system.system import System
@@ -39,17 +41,18 @@ if TYPE_CHECKING:
     from flexmb.closure.variation import ChainVariation
 
 
-@dataclass(frozen=True, eq=False)
-class Variations:
+class Variations(NamedTuple):
     """Derivatives at one state by the f independent ones of n free speeds; in a tree f = n.
 
-    rates (f,): udot; by_displacement, by_speed (f,f): its derivatives; drift (f,): its explicit derivative by time;
-    transport (f,f): xi' = du + transport xi; motion (nq,f): N; mass (f,f): mass matrix. chosen (f,): indices of the
-    independent speeds among the free ones; movable: indices among these of coordinates that are not cyclic.
-    by_chosen (2n,2f): displacements and changes of all free speeds by those of the independent ones.
+    free: of all speeds, of which the others follow. rates (f,): udot; by_displacement, by_speed (f,f): its derivatives;
+    drift (f,): its explicit derivative by time; transport (f,f): xi' = du + transport xi; motion (nq,f): N; mass (f,f):
+    mass matrix. chosen (f,): indices of the independent speeds among the free ones; movable: indices among these of
+    coordinates that are not cyclic. by_chosen (2n,2f): displacements and changes of all free speeds by those of the
+    independent ones.
     """
 
     state: State
+    free: FreeVariation
     rates: Real
     by_displacement: Real
     by_speed: Real
@@ -69,7 +72,11 @@ class Variations:
     @property
     def A(self) -> Real:
         """(2n,2n) matrix of d[xi; du]/dt."""
-        return np.block([[self.transport, np.eye(len(self.rates))], [self.by_displacement, self.by_speed]])
+        n = len(self.rates)
+        found = np.empty((2 * n, 2 * n))
+        found[:n, :n], found[:n, n:] = self.transport, np.eye(n)
+        found[n:, :n], found[n:, n:] = self.by_displacement, self.by_speed
+        return found
 
 
 class RestForces(NamedTuple):
@@ -102,12 +109,23 @@ class Equations:
         self.system = system
         self.constants = system.constants if constants is None else constants
         self.free: Index = np.flatnonzero(self.constants.speed["prescribed"] < 0)
+        self._among_free = np.ix_(self.free, self.free)
+        """Rows and columns (n,n) of the free speeds in those of all."""
         wheels = self.constants.wheel["u_index"]
-        self._indifferent: Index = wheels[self.constants.speed["stiffness"][wheels] == 0.0]
+        self._movable = np.ones(system.nu, bool)
+        self._movable[wheels] = self.constants.speed["stiffness"][wheels] != 0.0
+        quaternion, q, u = (self.constants.body[key] for key in ("quaternion", "q_index", "u_index"))
+        self._turning = [(int(u[k]), bool(quaternion[k] > q[k])) for k in np.flatnonzero(quaternion >= 0)]
+        """Where the speeds of spherical and free hinges begin, and whether they are free."""
         # Workspaces have a row for each function, and tables of which coordinates are driven.
         self._as_system = same_structure(self.constants, system.constants)
         shared = like is not None and same_structure(self.constants, like.constants)
         self._root: Equations = like._root if like is not None and shared else self
+
+    @kept
+    def labels(self) -> ModelLabels:
+        """Names and units in the linear models of all equations of this structure."""
+        return self._root.labels if self._root is not self else model_labels(self.system, self.constants, self.free)
 
     @property
     def freedom(self) -> int:
@@ -209,7 +227,7 @@ class Equations:
 
     def mass(self, state: State) -> Real:
         """Mass matrix (n,n) of the free speeds, without closures."""
-        return self.system.mass_matrix(state)[np.ix_(self.free, self.free)]
+        return self.system.mass_matrix(state)[self._among_free]
 
     def loads(self, state: State, at: RestForces) -> Real:
         """Generalised loads, N (N m), on the coordinates (f,) that are independent at another state."""
@@ -219,7 +237,7 @@ class Equations:
         """Loads and tangent stiffness at a state; DynamicsError where the accelerations do not exist."""
         found, free = self._free.stiffness(state.t, pack(state)), self.free
         self._examine(state)
-        both, rates = np.ix_(free, free), found.accelerations[free]
+        both, rates = self._among_free, found.accelerations[free]
         mass = found.mass[both]
         chosen, N = self._independent(mass, found.J[:, free])
         return RestForces(
@@ -233,14 +251,14 @@ class Equations:
 
     def movable(self, chosen: Index) -> Index:
         """Indices among these free speeds of those whose coordinate is not cyclic: all but wheels without springs."""
-        return np.flatnonzero(~np.isin(self.free[chosen], self._indifferent))
+        return np.flatnonzero(self._movable[self.free[chosen]])
 
     def variations(self, state: State) -> Variations:
         """Exact derivatives at a state; DynamicsError where the accelerations do not exist."""
         found, free, n = self.free_variation(state), self.free, len(self.free)
-        of_rates, everything, both = found.of_accelerations, np.arange(n), np.ix_(free, free)
+        of_rates, everything, both = found.of_accelerations, np.arange(n), self._among_free
         return Variations(
-            state, found.accelerations[free], of_rates.by_displacement[both], of_rates.by_speed[both],
+            state, found, found.accelerations[free], of_rates.by_displacement[both], of_rates.by_speed[both],
             of_rates.by_time[free], self._transport(state.u), found.motion[:, free], self.mass(state), everything,
             self.movable(everything), np.eye(2 * n),
         )  # fmt: skip
@@ -256,20 +274,18 @@ class Equations:
         """The state with prescribed coordinates and speeds at the values of their functions at its time."""
         y = pack(state)
         self.system.project(state.t, y, self.constants)
-        return State(y[: self.system.nq], y[self.system.nq : -1], state.t, self.system.layout)
+        return self.system.layout.known(state.t, y)
 
     def _transport(self, u: Real) -> Real:
         """(n,n) of xi' = du + transport xi: carried axes turn with their own angular velocity."""
         out = np.zeros((len(u), len(u)))
-        for body in self.constants.body:
-            if body["quaternion"] >= 0:
-                j = int(body["u_index"])
-                turning = slice(j, j + 3)
-                out[turning, turning] = -_cross(u[turning])
-                if body["quaternion"] > body["q_index"]:
-                    moving = slice(j + 3, j + 6)
-                    out[moving, turning], out[moving, moving] = -_cross(u[moving]), -_cross(u[turning])
-        return out[np.ix_(self.free, self.free)]
+        for j, also_moves in self._turning:
+            turning = slice(j, j + 3)
+            out[turning, turning] = -_cross(u[turning])
+            if also_moves:
+                moving = slice(j + 3, j + 6)
+                out[moving, turning], out[moving, moving] = -_cross(u[moving]), -_cross(u[turning])
+        return out[self._among_free]
 
 
 def same_structure(a: Any, b: Any) -> bool:

@@ -102,7 +102,7 @@ class Integration:
             self.batch = batch(system, moving, algorithm.observing, system.nq + system.nu + 1)
         self._enter: Any = None  # the compiled integrator
         self._turns: tuple[list[int], float, int] | None = None
-        if not all(link.is_rigid for link in system.links):
+        if not system.is_rigid:
             from flexmb.system.level_range import turns_to_watch  # imported here as many scenes have no flexible bodies
 
             self._turns = turns_to_watch(system)

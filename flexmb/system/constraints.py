@@ -59,7 +59,7 @@ class Constraints:
         )
         tree = scene.constraints, (system.constants, self.tables), system.layout, system.workspace
         self._shared = self.own.closures = Closures(*tree, slowest_mode(system.links), system.check_status)
-        self._start: State | None = None
+        self._start: Real | None = None
 
     @per_thread
     def closures(self) -> Closures:
@@ -73,8 +73,8 @@ class Constraints:
         if self._start is None:
             y = pack(system.scene_state(0.0))
             y = self._as_asked(0.0, y, asked(system, y))
-            self._start = State(y[: system.nq], y[system.nq : -1], 0.0, system.layout)
-        return State(self._start.q, self._start.u, 0.0, system.layout)
+            self._start = y
+        return system.layout.known(0.0, self._start.copy())
 
     @property
     def rank(self) -> int:

@@ -100,9 +100,7 @@ class Linearisation:
         row, change = self._row_along(motion, directions)
         return by_names(self._system.observation, row, change, partial(_split, self._system.nu, OfGivenMotion))
 
-    def of_hinge_loads(
-        self, state: State, axes: Axes, about: tuple[str, str] | None
-    ) -> dict[str, OfFreeMotion]:
+    def of_hinge_loads(self, state: State, axes: Axes, about: tuple[str, str] | None) -> dict[str, OfFreeMotion]:
         """See `System.hinge_load_derivatives`."""
         t, y = self._differentiable(state, "system.hinge_load_derivatives")
         referred(self._system, self._system.own_workspace, {}, axes, about)  # refuses unknown axes and nodes

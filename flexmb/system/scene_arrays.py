@@ -72,6 +72,11 @@ class SceneArrays:
         return y
 
     @kept
+    def is_rigid(self) -> bool:
+        """Whether all bodies are rigid."""
+        return all(link.is_rigid for link in self.links)
+
+    @kept
     def _at_start(self) -> Real:
         """(nq+nu+1,) [q, u, 0] of the scene at t = 0."""
         q, u = np.zeros(self.nq), np.zeros(self.nu)

@@ -125,7 +125,7 @@ WAIVERS: tuple[Waiver, ...] = tuple(watch.waiver for watch in WATCHES)
 def said(seen: WatchedStates) -> list[Said]:
     """What all watches say that the scene does not waive."""
     system = seen.system
-    if not len(seen.t) or all(link.is_rigid for link in system.links):
+    if not len(seen.t) or system.is_rigid:
         return []
     skipped = seen.failed or not len(system.constants.section)
     return [
@@ -138,7 +138,8 @@ def said(seen: WatchedStates) -> list[Said]:
 
 def of_states(system: System, states: Sequence[State], turns: Callable[[int], Real] | None = None) -> WatchedStates:
     """States of a system that are no samples of a run; turns: see `WatchedStates`, by the functions of time of the
-    system if left out."""
+    system if left out. None are looked at where all bodies are rigid."""
+    states = () if system.is_rigid else states
     t, q, u = (np.array([getattr(state, key) for state in states]) for key in ("t", "q", "u"))
     loads = _loads(system, states) if len(system.constants.section) and not system.scene.controllers else None
     return WatchedStates(system, t, q, u, turns or (lambda n: system.turns(float(t[n]), q[n], u[n])), loads=loads)
