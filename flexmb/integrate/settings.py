@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -49,8 +49,8 @@ class Settings:
 
     def checked(self, t_end: float) -> Settings:
         """The same in plain numbers; ValueError for settings that make no sense, TypeError for anything but numbers."""
-        plain = replace(
-            self,
+        plain = Settings(
+            self.method,
             rtol=arguments.number("rtol", self.rtol),
             atol=arguments.number("atol", self.atol),
             step=None if self.step is None else arguments.number("step", self.step),

@@ -7,7 +7,7 @@ from time import perf_counter
 from flexmb.integrate.control import ACCEPTED, EVALUATIONS, FACTORISATIONS, JACOBIANS, REJECTED
 from flexmb.run.observing import observe
 from flexmb.run.propagate import Integration, Raw
-from flexmb.run.run_arrays import Statistics
+from flexmb.run.run_arrays import Statistics, fitting
 from flexmb.run.trajectory import Trajectory, gathered
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.system import System
@@ -32,7 +32,7 @@ def observed(system: System, times: Real, raw: Raw, algorithm: Algorithm, solve:
     states = raw.states[: len(rows)]
     signals, power = ({}, {}) if solve.feedback is None else solve.feedback.course(times, states)
     q_names, u_names = system.state_names
-    return Trajectory(
+    parts = dict(
         scene=system.scene.name,
         status=status,
         message=message,
@@ -57,6 +57,7 @@ def observed(system: System, times: Real, raw: Raw, algorithm: Algorithm, solve:
             output_s=perf_counter() - start,
         ),
     )
+    return fitting(Trajectory, parts)
 
 
 def _why(trouble: DynamicsError | KeyboardInterrupt) -> Status:

@@ -30,16 +30,20 @@ def sample_times(samples: int | Sequence[float] | Real, t_end: float, t_start: f
             raise ValueError(f"samples is {number}: ask for at least 2 output times, the start and the end")
         _refuse_samples(number, _SAMPLE_BYTES)
         times = np.linspace(t_start, t_end, number)
-        if np.all(np.diff(times) > 0.0):
+        if _increase(times):
             return times
         raise ValueError(f"samples is {number}: too many to be distinct from {t_start:g} to t_end = {t_end:g} s")
     times = arguments.array("samples", samples)
-    increasing = times.ndim == 1 and len(times) > 1 and bool(np.all(np.diff(times) > 0.0))
+    increasing = times.ndim == 1 and len(times) > 1 and _increase(times)
     if not (increasing and times[0] == t_start and times[-1] == t_end):
         raise ValueError(
             f"the output times must increase from {t_start:g} to t_end = {t_end:g} s: sort them and add both ends"
         )
     return times.copy()
+
+
+def _increase(times: Real) -> bool:
+    return bool((times[1:] > times[:-1]).all())
 
 
 def refuse_large_run(scene: Scene | System, samples: int, settings: Settings, algorithm: Algorithm) -> None:

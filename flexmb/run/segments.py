@@ -118,4 +118,4 @@ class Segments:
     def _left(self) -> Settings:
         """The settings with the number of steps that earlier segments have left."""
         settings = self._situation.settings
-        return replace(settings, max_steps=max(settings.max_steps - self._steps, 0))
+        return replace(settings, max_steps=max(settings.max_steps - self._steps, 0)) if self._steps else settings

@@ -108,9 +108,10 @@ def simulate(
         check_and_warn(scene, t_end, t)
     chosen = Settings(method, **settings).checked(max(abs(t), abs(t_end)))
     times = sample_times(samples, t_end, t)
-    refuse_large_run(scene, len(times), chosen, algorithm)
-    system = scene if isinstance(scene, System) else assembled(scene)
-    return run_stages([RunPart(system, times)], state, chosen, algorithm, stabilise)
+    if isinstance(scene, Scene):
+        refuse_large_run(scene, len(times), chosen, algorithm)  # before anything is built
+        scene = assembled(scene)
+    return run_stages([RunPart(scene, times)], state, chosen, algorithm, stabilise)
 
 
 class RunPart(NamedTuple):

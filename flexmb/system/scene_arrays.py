@@ -67,7 +67,8 @@ class SceneArrays:
 
     def _projected(self, t: float, y: Real) -> Real:
         """A copy of y with work zero, prescribed motions at their values for time t, and quaternions of unit length."""
-        y = np.r_[y[:-1], 0.0]
+        y = y.copy()
+        y[-1] = 0.0
         coordinates.project(t, y, self.constants)
         return y
 
