@@ -108,7 +108,7 @@ def _unless_turned(closures: Closures, t: float, y: Real, hold: KeptValues, clos
         found = closing(closures, t, y, hold)
     except ClosureError:
         return None
-    return None if any(turned for _, turned in closures.half_turned()) else found
+    return None if closures.half_turned() else found
 
 
 def _closed(closures: Closures, t: float, y: Real, hold: KeptValues) -> Real:
@@ -312,12 +312,12 @@ def _decomposed(of: GroupResponse) -> Group:
 
 def _refuse_half_a_turn(closures: Closures) -> None:
     """ClosureError where axes that should be equal are opposite: the rows vanish there too."""
-    for name, turned in closures.half_turned():
-        if turned:
-            raise ClosureError(
-                f'closure "{name}" closes only with its frames half a turn apart: turn quaternion_b, or give initial '
-                "coordinates closer to the closed configuration"
-            )
+    turned = closures.half_turned()
+    if turned:
+        raise ClosureError(
+            f'closure "{turned[0]}" closes only with its frames half a turn apart: turn quaternion_b, or give initial '
+            "coordinates closer to the closed configuration"
+        )
 
 
 def _gap(closures: Closures) -> Opening:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -310,7 +310,8 @@ class Closures:
 
     def _scale(self, key: str, largest: Real | float = np.inf) -> Real:
         c = self.constants[1]
-        size = np.minimum(self._own.closure[key], largest)[c.row["closure"]]
+        sizes = self._own.closure[key]
+        size = (sizes if largest is np.inf else np.minimum(sizes, largest))[c.row["closure"]]
         return c.weight / np.where(size > 0.0, size, 1.0)
 
     def moved(self, t: float, y: Real, x: Real) -> Real:
@@ -401,14 +402,23 @@ class Closures:
         s = "/s" if rates else ""
         return f"{called(self.scene[i])} (gap {gap:.3g} m{s}, angle {angle:.3g} rad{s})"
 
-    def half_turned(self) -> Iterator[tuple[str, bool]]:
-        """By closure, its name and whether axes that it keeps parallel are opposite."""
-        for closure, state in zip(self.scene, self._own.closure, strict=True):
-            if isinstance(closure, Coupling):
-                continue
-            R = state["rotation"].reshape(3, 3)
-            about = {"weld": (1, 2), "prismatic": (1, 2), "universal": (), "spherical": ()}.get(closure.type, (2,))
-            yield closure.name, any(R[i, i] < 0.0 for i in about)
+    def half_turned(self) -> list[str]:
+        """Names of the closures of which axes that they keep parallel are opposite."""
+        which, places = self._kept_parallel
+        opposite = which[self._own.closure["rotation"][which, places] < 0.0].tolist()
+        return list(dict.fromkeys(self.scene[i].name for i in opposite))
+
+    @kept
+    def _kept_parallel(self) -> tuple[Index, Index]:
+        """Numbers of closures, and places on the diagonals of their rotations, of all axes that are kept parallel."""
+        about = {"weld": (1, 2), "prismatic": (1, 2), "universal": (), "spherical": ()}
+        pairs = [
+            (i, 4 * axis)
+            for i, closure in enumerate(self.scene) if not isinstance(closure, Coupling)
+            for axis in about.get(closure.type, (2,))
+        ]  # fmt: skip
+        which, places = np.array(pairs, np.int64).reshape(-1, 2).T
+        return which, places
 
     def determined(self, t: float, y: Real) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Whether each component of the loads of hinges (N,6) and closures (C,6) is unaffected by all null loads."""

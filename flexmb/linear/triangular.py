@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg.lapack import dgeqp3, dtrtrs
 
 from flexmb.typing import Index, Real
 
+Matrix = NDArray[Any]
 
-def forward(root: Real, b: Real) -> Real:
+
+def forward(root: Matrix, b: Matrix) -> Matrix:
     """x (n,...) of L x = b, with the factor L (n,n) that `numpy.linalg.cholesky` gives."""
     return _solved(root, b, 1)
 
 
-def backward(root: Real, b: Real) -> Real:
+def backward(root: Matrix, b: Matrix) -> Matrix:
     """x (n,...) of L' x = b."""
     return _solved(root, b, 0)
 
@@ -27,12 +32,11 @@ def pivots(a: Real) -> Index:
     return order - 1
 
 
-def _solved(root: Real, b: Real, transposed: int) -> Real:
+def _solved(root: Matrix, b: Matrix, transposed: int) -> Matrix:
     """`root` is lower in rows, which to LAPACK is an upper triangle in columns."""
     if not b.size:
         return np.empty_like(b)
-    x: Real
     x, info = dtrtrs(root.T, b, lower=0, trans=transposed)
     if info:
         raise np.linalg.LinAlgError(f"a triangular matrix is singular in row {info}")
-    return x
+    return np.asarray(x)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field, fields
-from functools import cache
+from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple, TypeVar, assert_never
 
 import numpy as np
@@ -239,12 +238,7 @@ def fitting(kind: type[Run], parts: dict[str, Any]) -> Run:
 
 def told(run: Run, **words: Any) -> Run:
     """The run with other fields that are no arrays."""
-    return fitting(type(run), {name: getattr(run, name) for name in _fields(type(run))} | words)
-
-
-@cache
-def _fields(kind: type[RunArrays]) -> tuple[str, ...]:
-    return tuple(each.name for each in fields(kind))
+    return fitting(type(run), {name: getattr(run, name) for name in run.__dataclass_fields__} | words)
 
 
 def refuse_torn(run: RunArrays) -> None:

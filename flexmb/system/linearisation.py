@@ -61,6 +61,7 @@ class Linearisation:
     def of_accelerations(self, state: State, forces: Real | None) -> AccelerationDerivatives:
         """See `System.acceleration_derivatives`."""
         t, y = self._differentiable(state, "system.acceleration_derivatives")
+        at: FreeVariation | VariedAccelerations
         if forces is None:
             at = self._sound(t, y, self._variations.of_accelerations(t, y))
         else:
