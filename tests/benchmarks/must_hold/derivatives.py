@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
 
 import flexmb as fm
+from crosscheck.library.find import shipped_folder
 from flexmb.entry import articulated, tangent
 from flexmb.entry.derivatives import (
     acceleration_derivatives,
@@ -17,12 +19,13 @@ from flexmb.entry.derivatives import (
 from flexmb.jit.kernel import kernel
 from tests.benchmarks import peers
 from tests.benchmarks.compiled import pinocchio
-from tests.benchmarks.must_hold.row import Call, Measured, Row, how_many_times, measured
+from tests.benchmarks.must_hold.row import Call, Measured, Row, duration, how_many_times, measured
 from tests.benchmarks.rivals import flexible_chain, rigid_chain, turns
 from tests.flexmb.entry import dual_jacobian
 
 COMPILED, EVALUATIONS = "Derivatives from compiled code", "Jacobian of flexible chains"
-PYTHON = "Derivatives from Python"
+PYTHON, CALLS = "Derivatives from Python", "Public calls for one state"
+PUBLIC = {"derivatives": "`System.acceleration_derivatives`", "linearize": "`linearize`"}
 TO_ROUNDING = 1e-10  # of the largest element, in chains of at most 100 bodies
 BEAMS = {5: 8.0, 10: 12.0}
 """Evaluations at most, by the number of modes."""
@@ -59,6 +62,17 @@ def rows() -> list[Row]:
             )
             for modes, goal in BEAMS.items()
         ),
+        *(
+            Row(
+                f"call_{call}_{name}", CALLS, f"{what}, {words}", goal, partial(_public, scene, call), "at most",
+                "evaluations of the same derivatives",
+            )
+            for name, words, scene, goals in (
+                ("chain", "10 bodies", partial(rigid_chain, 10), (4.0, 35.0)),
+                ("loop", "a four-bar", _four_bar, (4.5, 100.0)),
+            )
+            for (call, what), goal in zip(PUBLIC.items(), goals, strict=True)
+        ),
     ]  # fmt: skip
 
 
@@ -77,6 +91,20 @@ def _from_python(bodies: int) -> Measured:
     results = evaluate.by_displacement, evaluate.by_speed, evaluate.by_force
     native = Call(lambda: evaluate(0.0, q, u), 1, lambda: np.concatenate([each.ravel() for each in results]))
     return how_many_times(native, peers.pinocchio_derivatives(scene, np.zeros(bodies)), TO_ROUNDING)
+
+
+def _four_bar() -> fm.Scene:
+    return fm.load_scene(shipped_folder() / "closed_chains" / "four_bar" / "scene.toml")
+
+
+def _public(scene: Callable[[], fm.Scene], call: str) -> Measured:
+    """What a call takes whose result is an object of its own, over an evaluator that overwrites its arrays."""
+    system = fm.compile(scene())
+    state, evaluate = system.initial_state, system.derivative_evaluator()
+    of_state = {"derivatives": system.acceleration_derivatives, "linearize": partial(fm.linearize, system)}[call]
+    seconds = turns(partial(of_state, state), partial(evaluate, state.t, state.q, state.u))
+    mine, other = np.median(seconds, axis=0)
+    return measured(seconds[:, 0] / seconds[:, 1], f"{duration(mine)} against {duration(other)}")
 
 
 def _forward(scene: fm.Scene, times: int = 100) -> Call:
