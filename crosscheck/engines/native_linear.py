@@ -15,7 +15,6 @@ from crosscheck.engines.linear.matrices import Errors, LinearMatrices, exact, no
 from crosscheck.engines.linear.outputs import NOTHING, LinearOutputs, outputs
 from crosscheck.engines.linear.parts import DERIVATIVES, LinearPart
 from flexmb.linear.equations import equations_of
-from flexmb.linear.linearize import displacement_names
 from flexmb.linear.variations import Equations, Variations
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.algorithms import ALGORITHMS
@@ -37,7 +36,7 @@ def linear_outputs(
     if obstacle(scene):
         return NOTHING
     equations = Equations(system)
-    order = places(coordinate_names(scene), displacement_names(equations)[0])
+    order = places(coordinate_names(scene), [name for name, _ in equations.labels.displacements])
     found = _exactly(equations, states) if algorithm == "articulated" else _by_differences(equations, algorithm, states)
     return outputs(asked, (at.ordered(order) for at in found), _offered(algorithm))
 
