@@ -117,11 +117,13 @@ class Parameters:
         rates = np.zeros((len(self._of_tables), len(scales)))
         rates[:, list(places)] = self._of_tables * scales[list(places)]
         tables, is_diagonal = self._found.tables, self._found.diagonal
-        if spare is not None and spare[0]._found._structure == self._found._structure and all(
-            put(each, spare[0]._found.tables, tables, is_diagonal, rates[:, LANES * b : LANES * (b + 1)])
-            for b, each in enumerate(spare[1])
-        ):
-            return spare[1]
+        if spare is not None and spare[0]._found._structure == self._found._structure:
+            moving = np.any(self._of_tables, axis=1) | np.any(spare[0]._of_tables, axis=1)
+            if all(
+                put(each, spare[0]._found.tables, tables, is_diagonal, rates[:, LANES * b : LANES * (b + 1)], moving)
+                for b, each in enumerate(spare[1])
+            ):
+                return spare[1]
         names = np.full(len(scales), "", object)
         names[list(places)] = self.names
         return blocks(tables, is_diagonal, names.tolist(), rates)
@@ -324,11 +326,15 @@ class _Differentiation:
         self.size = len(own)
         """The count of all floats of the tables; what follows them tells the errors of some of them."""
         integrals = moments(self.tables, self.tables)
-        ends = np.cumsum([self.size, *map(len, integrals)]).tolist()
-        sums = [slice(first, stop) for first, stop in itertools.pairwise(ends)]
+        self._ends = np.cumsum([self.size, *map(len, integrals)]).tolist()
         self._middle = np.concatenate([own, *integrals])
-        whole = np.r_[wholes(self.tables), np.zeros(ends[-1] - self.size)]
-        self._parts = Parts([*parts(self.tables, plant.nq), *sums], whole)
+
+    @kept
+    def _parts(self) -> Parts:
+        """The parts of all these floats."""
+        sums = [slice(first, stop) for first, stop in itertools.pairwise(self._ends)]
+        whole = np.r_[wholes(self.tables), np.zeros(self._ends[-1] - self.size)]
+        return Parts([*parts(self.tables, self._plant.nq), *sums], whole)
 
     @property
     def reached(self) -> set[str]:
@@ -359,7 +365,7 @@ class _Differentiation:
         def tables(values: Mapping[str, float]) -> Real:
             return self._with(chosen[0], values) if values else self._middle
 
-        found = iter(derivatives_together(tables, asked, self._parts, self.by, self._widths))
+        found = iter(derivatives_together(tables, asked, self._parts, self.by, self._widths) if asked else ())
         return [known[each.name] if each.name in known else next(found) for each in chosen]
 
     def kept(self, like: Parameters, chosen: Sequence[Number]) -> Steady | None:

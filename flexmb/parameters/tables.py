@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import fields, replace
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,7 +20,7 @@ from flexmb.jit.lanes import LANES
 from flexmb.jit.wide_arrays import as_duals
 from flexmb.levels.affine_integrals import moving_columns
 from flexmb.tables.arrays import Constants
-from flexmb.typing import Index, Real
+from flexmb.typing import Flags, Index, Real
 
 # What is no function of the numbers that motions depend on: thresholds for rounding, weights that compare rows, which
 # modes move masses along an axis. Their derivatives are zero.
@@ -73,11 +74,18 @@ def columns(tables: Tables) -> Iterator[TableFloats]:
     for kind, table in (("tree", tables.tree), ("closures", tables.closures)):
         for each in () if table is None else fields(table):
             array = getattr(table, each.name)
-            for field in array.dtype.names or (None,):
-                values = array if field is None else array[field]
-                if values.dtype == np.float64 and (field or each.name) not in _STEADY:
-                    yield TableFloats(f"{kind}.{each.name}", field, values)
+            for field in _fields_of(array.dtype, np.float64):
+                if (field or each.name) not in _STEADY:
+                    yield TableFloats(f"{kind}.{each.name}", field, array if field is None else array[field])
     yield TableFloats("start", None, tables.start)
+
+
+@cache
+def _fields_of(dtype: np.dtype, number: type) -> tuple[str | None, ...]:
+    """The fields of records that hold such numbers; None of an array that has no records but these."""
+    if dtype.names is None:
+        return (None,) if dtype == number else ()
+    return tuple(name for name in dtype.names if dtype[name].base == number)
 
 
 def numbers_of(tables: Tables) -> Real:
@@ -151,8 +159,8 @@ def structure(tables: Tables) -> dict[str, Any]:
         for each in () if table is None else fields(table):
             array = getattr(table, each.name)
             found[f"{kind}.{each.name}"] = array.shape
-            for field in array.dtype.names or ():
-                if array[field].dtype == np.int64 and field not in _DIAGONAL:
+            for field in _fields_of(array.dtype, np.int64):
+                if field is not None and field not in _DIAGONAL:
                     found[f"{kind}.{each.name}.{field}"] = array[field].tobytes()
     return found
 
@@ -184,7 +192,7 @@ def blocks(tables: Tables, is_diagonal: Real, names: Sequence[str], rates: Real)
 def _block(tables: Tables, names: tuple[str, ...], rates: Real) -> ParameterBlock:
     """Dual tables for the derivatives (n,k) by k parameters."""
     duals = {kind: _duals(table) for kind, table in (("tree", tables.tree), ("closures", tables.closures))}
-    for column, own in _with_rates(tables, rates):
+    for column, own in _with_rates(tables, rates, np.any(rates, axis=1)):
         kind, _, table = column.table.partition(".")
         wide = duals[kind][table] if column.field is None else duals[kind][table][column.field]
         wide[..., 1 : 1 + rates.shape[1]] = own
@@ -195,16 +203,17 @@ def _block(tables: Tables, names: tuple[str, ...], rates: Real) -> ParameterBloc
     return ParameterBlock(names, DualConstants(**tree), closures)
 
 
-def put(block: ParameterBlock, before: Tables, now: Tables, is_diagonal: Real, rates: Real) -> bool:
+def put(block: ParameterBlock, before: Tables, now: Tables, is_diagonal: Real, rates: Real, moving: Flags) -> bool:
     """Put other numbers of a tree into its dual tables in place: those of `now` for those of `before`, which have the
-    same structure, and their derivatives (n,k).
+    same structure, and their derivatives (n,k). moving (n,): which of them have derivatives, before or now.
 
     False where this does not do: what workspaces have copies of must stay, and the features of the kernels suffice.
     """
     old, new, wide = before.tree, now.tree, block.constants
     changed = [each.name for each in fields(new)
                if getattr(new, each.name).tobytes() != getattr(old, each.name).tobytes()]  # fmt: skip
-    lanes = [(column.table.removeprefix("tree."), column.field, each) for column, each in _with_rates(now, rates)]
+    lanes = [(column.table.removeprefix("tree."), column.field, each)
+             for column, each in _with_rates(now, rates, moving)]  # fmt: skip
     own = slice(1, 1 + rates.shape[1])
     if not (
         now.closures is None
@@ -234,12 +243,13 @@ def _of(table: Constants, name: str, field: str | None) -> Any:
     return array if field is None else array[field]
 
 
-def _with_rates(tables: Tables, rates: Real) -> Iterator[tuple[TableFloats, Real]]:
-    """All `columns` but the initial state, with their part (...,k) of derivatives (n,k) of `numbers_of` the tables."""
+def _with_rates(tables: Tables, rates: Real, moving: Flags) -> Iterator[tuple[TableFloats, Real]]:
+    """Those `columns` but the initial state in which some entries are `moving` (n,), with their part (...,k) of
+    derivatives (n,k) of `numbers_of` the tables."""
     start = 0
     for column in columns(tables):
         stop = start + column.values.size
-        if column.table != "start":
+        if column.table != "start" and np.any(moving[start:stop]):
             yield column, rates[start:stop].reshape(*column.values.shape, rates.shape[1])
         start = stop
 

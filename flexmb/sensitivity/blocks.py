@@ -50,7 +50,8 @@ class RowResponse(NamedTuple):
 class Blocks:
     """The tables of all blocks of a system, and the addresses of its kernels.
 
-    state, slope (B,nq+nu+1,9): [q, u, work] and its rate, the memory of the workspaces.
+    state, slope (B,nq+nu+1,9): [q, u, work] and its rate, the memory of the workspaces. every (B,m,9): everything
+    observable, the memory of the outputs. Addresses of kernels: motion, manifold, observing_at, closure_loads_at.
     """
 
     def __init__(self, system: System, tables: Sequence[DualTables], directions: int) -> None:
@@ -60,16 +61,24 @@ class Blocks:
         self.workspaces = [
             _workspace(system, each.constants, self.state[b], self.slope[b]) for b, each in enumerate(tables)
         ]
-        self.outputs: list[OutputsTangent] = [outputs_tangent(system.observation.out) for _ in tables]
+        out, closures = system.observation.out, 0 if system.closures is None else len(system.scene.constraints)
+        free = len(out.every) + len(out.drives)
+        self.every = wide_zeros((len(tables), free + 6 * closures), width=DualType.width)
+        self.outputs: list[OutputsTangent] = [outputs_tangent(out, each[:free]) for each in self.every]
         self._kind: Any = tree if system.closures is None else chain
+        self._loads = list[chain.ClosureLoads]()
         if system.closures is None:
             pairs = zip(tables, self.workspaces, strict=True)
             self.tables: list[Any] = [tree.TreeBlock(c=each.constants, w=w) for each, w in pairs]
         else:
-            self._loads = [chain.ClosureLoads(as_duals(np.zeros((len(system.scene.constraints), 6)))) for _ in tables]
+            self._loads = [chain.ClosureLoads(each[free:].reshape(closures, 6, -1)) for each in self.every]
             self.tables = self._chains(system)
         self.motion, _ = addresses(self._kind.motion, STATUS, REAL, self.tables[0])
         self.manifold, _ = addresses(self._kind.manifold, VOID, REAL, self.tables[0])
+        self.observing_at, *_ = addresses(self._kind.observing, VOID, self.tables[0], self.outputs[0])
+        self.closure_loads_at = 0
+        if self._loads:
+            self.closure_loads_at, *_ = addresses(chain.closure_loads, VOID, self.tables[0], self._loads[0])
 
     def _chains(self, system: System) -> list[Any]:
         assert system.closures is not None
@@ -93,14 +102,14 @@ class Blocks:
         return len(self.tables)
 
     @property
-    def observing(self) -> Any:
-        """The kernel (tables, outputs) that finds everything observable, but for the loads of closures."""
-        return self._kind.observing
-
-    @property
     def where(self) -> list[int]:
         """Addresses of the tables of all blocks."""
         return [address(each) for each in self.tables]
+
+    @property
+    def where_loads(self) -> list[int]:
+        """Addresses of the loads of closures of all blocks; 0 in trees."""
+        return [address(each) for each in self._loads] or [0] * len(self)
 
     @property
     def fault(self) -> int:
@@ -116,26 +125,6 @@ class Blocks:
     def place(self, status: Status) -> str:
         """Name of the item at which the last evaluation failed."""
         return self.system.fault_name(status, self.fault)
-
-    def observe(self) -> ObservedRates:
-        """Everything observable where the motion of all blocks was just evaluated."""
-        return self.observed(self.rows())
-
-    def observed(self, rows: Sequence[Real]) -> ObservedRates:
-        """The same from `rows`, (...,m,9) of each block."""
-        return ObservedRates(rows[0][..., 0].copy(), self.joined(rows))
-
-    def rows(self) -> list[Real]:
-        """The same as duals (m,9) of each block."""
-        rows = []
-        for b, (block, out) in enumerate(zip(self.tables, self.outputs, strict=True)):
-            self._kind.observing(block, out)
-            parts = [out.every, out.drives]
-            if self.system.closures is not None:
-                chain.closure_loads(block, self._loads[b])
-                parts.append(self._loads[b].every.reshape(-1, DualType.width))
-            rows.append(np.concatenate(parts))
-        return rows
 
     def inertia_forces(self, t: float, rates: Real) -> tuple[Real, Real]:
         """M rates (nu,) for given rates (nu,) at the coordinates of the blocks' states, and its derivatives (nu,P)."""

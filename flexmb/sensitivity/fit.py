@@ -14,11 +14,12 @@ import os
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Unpack
+from typing import Any, Unpack
 
 import numpy as np
 
 from flexmb.integrate.settings import Settings
+from flexmb.kept import kept
 from flexmb.parameters.numbers import numbers
 from flexmb.run.driver import Leg
 from flexmb.run.samples import refuse_large_run
@@ -27,7 +28,7 @@ from flexmb.run.trajectory import Trajectory
 from flexmb.scene.check import check_and_warn
 from flexmb.scene.problems import SceneError, SceneWarning, closest
 from flexmb.scene.schema import Scene
-from flexmb.sensitivity.channels import refuse_unknown_outputs
+from flexmb.sensitivity.channels import Chosen, chosen, refuse_unknown_outputs
 from flexmb.sensitivity.gate import Admitted, admitted_to, again, prepared
 from flexmb.sensitivity.measurements import Measurements, measurements
 from flexmb.sensitivity.rows import aligned
@@ -107,13 +108,20 @@ class Fit:
         return f"{self.parameters[j]} ({self.correlation[k, j]:+.2f})"
 
 
-class _Run(NamedTuple):
-    """A run of the system of a scene, and its parts between events."""
+@dataclass(frozen=True)
+class _Run:
+    """A run of the system of a scene, its parts between events, and the channels that were measured."""
 
     scene: Scene
     system: System
     trajectory: Trajectory
     course: list[Leg]
+    channels: tuple[str, ...]
+
+    @kept
+    def outputs(self) -> Chosen:
+        """Residuals and derivatives ask for these channels."""
+        return chosen(self.trajectory, self.channels)
 
 
 class _Problem:
@@ -146,7 +154,8 @@ class _Problem:
                 check_and_warn(scene, float(self.times[-1]))
                 refuse_large_run(scene, len(self.times), self.settings, "articulated")
                 system = prepared(scene)
-                self._last = key, _Run(scene, system, *run_with_course(system, self.times, self.settings))
+                trajectory, course = run_with_course(system, self.times, self.settings)
+                self._last = key, _Run(scene, system, trajectory, course, self.data.channels)
         return self._last[1]
 
     def derivatives(self, x: Real) -> Real:
@@ -156,13 +165,12 @@ class _Problem:
             warnings.simplefilter("ignore", SceneWarning)
             last = self._admitted
             self._admitted = admitted_to(run.system, self.names) if last is None else again(last, run.system)
-            found = of_run(self._admitted, self.settings, run.trajectory, run.course, self.data.channels)
+            found = of_run(self._admitted, self.settings, run.trajectory, run.course, run.outputs)
         return found.derivatives[-len(self.data.t) :] * self.scales
 
-    def seen(self, trajectory: Trajectory) -> Real:
+    def seen(self, run: _Run) -> Real:
         """The channels (T,K) of a run at the times of the measurements."""
-        found = {name: values for name, _, values in trajectory.columns()}
-        return np.column_stack([found[name] for name in self.data.channels])[-len(self.data.t) :]
+        return run.outputs.values[-len(self.data.t) :]
 
 
 def fit(
@@ -215,10 +223,10 @@ def _searched(problem: _Problem, start: Real, limits: tuple[Real, Real], noise: 
 
     def residuals(x: Real) -> Real:
         try:
-            run = problem.run(x).trajectory
+            run = problem.run(x)
         except (SceneError, DynamicsError):
             run = None
-        if run is None or not run.finished or len(run.t) < len(problem.times):
+        if run is None or not run.trajectory.finished or len(run.trajectory.t) < len(problem.times):
             return np.full(int(np.sum(known)), np.nan)  # the search takes a shorter step
         found: Real = ((problem.seen(run) - data.values) / weights)[known]
         return found
@@ -257,7 +265,7 @@ def _searched(problem: _Problem, start: Real, limits: tuple[Real, Real], noise: 
 
 def _found(problem: _Problem, x: Real, solution: Any, J: Real, weights: Real, estimated: bool) -> Fit:
     made = problem.run(x)
-    off = np.where(problem.known, problem.seen(made.trajectory) - problem.data.values, np.nan)
+    off = np.where(problem.known, problem.seen(made) - problem.data.values, np.nan)
     covariance, unseen = _covariance(J, x)
     sigma = np.sqrt(np.diag(covariance))
     with np.errstate(invalid="ignore"):

@@ -20,8 +20,8 @@ from flexmb.tables.status import OK
 from flexmb.typing import Index, Real
 
 # Indices in `VariationalFlow.address`; 0 where there is none.
-MOTION, MANIFOLD, CONTROL, FOLLOW = range(4)
-ADDRESSES = 4
+MOTION, MANIFOLD, CONTROL, FOLLOW, OBSERVING, CLOSURE_LOADS = range(6)
+ADDRESSES = 6
 
 
 @bundle
@@ -34,9 +34,12 @@ class VariationalFlow:
     address: Index  # (ADDRESSES,) of kernels
     block: Index  # (B,) addresses of the tables of each block
     loop: Index  # (B,) of its controllers; 0 without
+    output: Index  # (B,) of its outputs
+    load: Index  # (B,) of the loads of its closures; 0 in a tree
     directions: Index  # (1,) P
     state: Real  # (B,nq+nu+1,9) [q, u, work] as duals; the memory of the blocks' workspaces
     slope: Real  # (B,nq+nu+1,9) likewise its rate
+    every: Real  # (B,m,9) everything observable, the memory of the outputs
     law: Real  # (B,states,9) likewise the states of controllers
     law_rate: Real  # (B,states,9)
     continuous: Index  # (X,) which of these are integrated
@@ -68,6 +71,28 @@ def evaluate_at(t, z, b, s):
     """Evaluate one block at z, for its outputs; returns a status code."""
     take(z, b, s)
     return evaluate(t, b, s)
+
+
+@kernel
+def observe_at(times, states, values, rates, s):
+    """Everything observable at states (T,.): values (T,m), and rates (T,m,P). Returns a status code, and the number of
+    states that were evaluated before."""
+    for i in range(times.shape[0]):
+        for b in range(s.block.shape[0]):
+            take(states[i], b, s)
+            status = evaluate(times[i], b, s)
+            if status != OK:
+                return status, i
+            nothing_at(s.address[OBSERVING], (s.block[b], s.output[b]))
+            if s.address[CLOSURE_LOADS]:
+                nothing_at(s.address[CLOSURE_LOADS], (s.block[b], s.load[b]))
+            lanes = min(LANES, rates.shape[2] - LANES * b)
+            for j in range(values.shape[1]):
+                number = s.every[b, j]
+                values[i, j] = number[0]
+                for lane in range(lanes):
+                    rates[i, j, LANES * b + lane] = number[1 + lane]
+    return OK, times.shape[0]
 
 
 @helper

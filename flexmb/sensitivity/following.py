@@ -84,12 +84,12 @@ class Following:
         known = channels(system, names)
         if loops is not None:
             if is_last:
-                variation.put_joined(float(times[-1]), states[-1])  # controllers act at the end of the run
+                variation.put(float(times[-1]), states[-1])  # controllers act at the end of the run
             loops.replay()
         places = np.searchsorted(times, self._trajectory.t[wanted])
         for first in range(0, len(places), TOGETHER):
             own = slice(first, first + TOGETHER)
-            seen = self._seen(variation, times[places[own]].tolist(), states[places[own]])
+            seen = self._seen(variation, times[places[own]], states[places[own]])
             samples = slice(wanted.start + first, min(wanted.start + first + TOGETHER, wanted.stop))
             for k, name in enumerate(self._outputs.names):
                 if name in known:
@@ -97,16 +97,14 @@ class Following:
                 elif ".drive[" in name:  # of a coordinate that is free here
                     self._derivatives[samples, k] = 0.0
 
-    def _seen(self, variation: Variation, times: list[float], states: Real) -> Seen:
-        """What is known at states (T,.) that are joined with their derivatives."""
-        loops, rows, signals = variation.loops, list[list[Real]](), list[Real]()
-        has_signals = loops is not None and any(name.startswith("signal.") for name in self._outputs.names)
-        for t, z in zip(times, states, strict=True):
-            if self._outputs.observed:
-                variation.put_joined(t, z)
-                rows.append(variation.blocks.rows())
-            if has_signals and loops is not None:
+    def _seen(self, variation: Variation, times: Real, states: Real) -> Seen:
+        """What is known at times (T,), in states (T,.) that are joined with their derivatives."""
+        loops, signals = variation.loops, list[Real]()
+        observed = variation.observed(times, states) if self._outputs.observed and len(times) else None
+        if loops is not None and any(name.startswith("signal.") for name in self._outputs.names):
+            if observed is not None:
+                loops.replay()  # once more from the first of these times
+            for t, z in zip(times.tolist(), states, strict=True):
                 variation.take(variation.parted(z))
                 signals.append(loops.look(t)[1])
-        observed = variation.blocks.observed([np.array(each) for each in zip(*rows, strict=True)]) if rows else None
         return Seen(variation.parted(states).Y, observed, np.array(signals) if signals else None)

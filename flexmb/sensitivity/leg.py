@@ -10,6 +10,7 @@ from flexmb.integrate.control import ACCEPTED, COUNTS, REJECTED, SAMPLES, STOP
 from flexmb.integrate.problem import Accuracy, Clock, problem
 from flexmb.integrate.settings import Settings
 from flexmb.integrate.watch import nothing_watched
+from flexmb.jit.direct import address
 from flexmb.jit.lanes import LANES
 from flexmb.run.driver import Leg
 from flexmb.run.interruption import interruptible
@@ -17,7 +18,7 @@ from flexmb.run.outputs import ending
 from flexmb.run.propagate import Integration
 from flexmb.run.switching import clock_of
 from flexmb.sensitivity import flow
-from flexmb.sensitivity.blocks import Blocks
+from flexmb.sensitivity.blocks import Blocks, ObservedRates
 from flexmb.sensitivity.loops import Loops
 from flexmb.tables.state import DynamicsError
 from flexmb.tables.status import OK, Status
@@ -44,6 +45,7 @@ class Variation:
         n, B = system.nq + system.nu + 1, len(blocks)
         where = np.zeros(flow.ADDRESSES, np.int64)
         where[flow.MOTION], where[flow.MANIFOLD] = blocks.motion, blocks.manifold
+        where[flow.OBSERVING], where[flow.CLOSURE_LOADS] = blocks.observing_at, blocks.closure_loads_at
         law, law_rate, continuous = np.zeros((B, 0, 9)), np.zeros((B, 0, 9)), np.zeros(0, np.int64)
         if loops is not None:
             where[flow.CONTROL], where[flow.FOLLOW] = loops.steer, loops.follow
@@ -51,8 +53,9 @@ class Variation:
         self._width = n + len(continuous)
         self.flow = flow.VariationalFlow(
             address=where, block=np.array(blocks.where), loop=np.array(loops.where if loops else [0] * B),
-            directions=np.array([blocks.directions]), state=blocks.state, slope=blocks.slope, law=law,
-            law_rate=law_rate, continuous=continuous,
+            output=np.array([address(each) for each in blocks.outputs]), load=np.array(blocks.where_loads),
+            directions=np.array([blocks.directions]), state=blocks.state, slope=blocks.slope, every=blocks.every,
+            law=law, law_rate=law_rate, continuous=continuous,
         )  # fmt: skip
 
     def joined(self, at: Course) -> Real:
@@ -73,14 +76,24 @@ class Variation:
         self.check(flow.rhs(t, z, rates, self.flow, self.flow), t)
         return self.parted(rates)
 
-    def put(self, t: float, at: Course) -> None:
-        """Evaluate all blocks at a state, for their outputs."""
-        self.put_joined(t, self.joined(at))
-
-    def put_joined(self, t: float, z: Real) -> None:
-        """The same of a state that is `joined` with its derivatives."""
+    def put(self, t: float, z: Real) -> None:
+        """Evaluate all blocks at a state that is `joined` with its derivatives."""
         for b in range(len(self.blocks)):
             self.check(flow.evaluate_at(t, z, b, self.flow), t)
+
+    def observed(self, times: Real, states: Real) -> ObservedRates:
+        """Everything observable at times (T,), in states (T,.) that are `joined` with their derivatives."""
+        T, m, P = len(times), self.blocks.every.shape[1], self.blocks.directions
+        found = ObservedRates(np.empty((T, m)), np.empty((T, m, P)))
+        status, count = flow.observe_at(times, states, *found, self.flow)
+        if status != OK:
+            self.check(status, float(times[count]))
+        return found
+
+    def observed_at(self, t: float, at: Course) -> ObservedRates:
+        """The same at one state: (m,) and (m,P)."""
+        found = self.observed(np.array([t]), self.joined(at)[None])
+        return ObservedRates(found.row[0], found.rates[0])
 
     def take(self, at: Course) -> None:
         """Set the states of all blocks without evaluating them."""
@@ -95,9 +108,8 @@ class Variation:
 
     def energy_rates(self, t: float, at: Course) -> Real:
         """The derivatives (P,) of the energy at a state."""
-        self.put(t, at)
         place, _ = self.blocks.system.observation.columns["energy"]
-        rates: Real = np.sum(self.blocks.observe().rates[place], axis=0)
+        rates: Real = np.sum(self.observed_at(t, at).rates[place], axis=0)
         return rates
 
     def check(self, status: int, t: float) -> None:

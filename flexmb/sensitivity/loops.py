@@ -137,7 +137,7 @@ def _variation(made: Loop, feedback: Feedback, plain: PlainLaw, blocks: Blocks, 
     if made.has_markers[0]:
         where[MARKERS] = addresses(tree.see, VOID, REAL, c, w, out)[0]
     if made.has_at_once[0]:
-        where[OBSERVING] = addresses(blocks.observing, VOID, blocks.tables[b], out)[0]
+        where[OBSERVING] = blocks.observing_at
     held, table = np.zeros((max(feedback.samples, len(made.held)), made.held.shape[1])), feedback.schedule
     held[: len(made.held)] = made.held
     return LoopVariation(

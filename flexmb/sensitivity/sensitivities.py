@@ -19,7 +19,7 @@ from flexmb.scene.check import check_and_warn
 from flexmb.scene.problems import closest
 from flexmb.scene.schema import Scene
 from flexmb.scene.sizes import refuse_bytes
-from flexmb.sensitivity.channels import chosen, refuse_unknown_outputs
+from flexmb.sensitivity.channels import Chosen, chosen, refuse_unknown_outputs
 from flexmb.sensitivity.following import Following
 from flexmb.sensitivity.gate import Admitted, admitted
 from flexmb.tables import arguments
@@ -110,14 +110,13 @@ def sensitivities(
     trajectory, course = run_with_course(gated.system, times, given)
     if not trajectory.finished:
         raise DynamicsError(f"there are no derivatives of a run that does not finish: {trajectory.message}")
-    return of_run(gated, given, trajectory, course, of)
+    return of_run(gated, given, trajectory, course, chosen(trajectory, of))
 
 
 def of_run(
-    gated: Admitted, settings: Settings, trajectory: Trajectory, course: Sequence[Leg], of: Sequence[str]
+    gated: Admitted, settings: Settings, trajectory: Trajectory, course: Sequence[Leg], outputs: Chosen
 ) -> Sensitivities:
-    """The derivatives of a run that has finished; course: its parts between events."""
-    outputs = chosen(trajectory, of)
+    """The derivatives of a run that has finished; course: its parts between events; outputs: of its channels."""
     derivatives, events = Following(gated, settings, trajectory, outputs)(course)
     return Sensitivities(
         trajectory.t, outputs.names, outputs.units, outputs.values, tuple(each.name for each in gated.numbers),

@@ -101,8 +101,9 @@ class Systems:
         return self._blocks(found, held)
 
     def _blocks(self, known: KnownTables, held: Mapping[str, Real]) -> Blocks:
-        """The blocks with derivatives of what is held, which those that are taken over do not have."""
-        if not held:
+        """The blocks with derivatives of what is held, and with functions of their own where controllers write into
+        them: those that are taken over have neither."""
+        if not held and not known.system.scene.controllers:
             return Blocks(known.system, known.duals, len(self._scales))
         found = []
         for b, each in enumerate(known.duals):

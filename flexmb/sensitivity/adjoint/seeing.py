@@ -29,8 +29,7 @@ class Seeing:
         """Values, and derivatives (D,), by name of the channel, at the state y (n,)."""
         observed = own = None
         if self._observed:
-            self._variation.put(t, Course(y, self._along))
-            observed = self._variation.blocks.observe()
+            observed = self._variation.observed_at(t, Course(y, self._along))
             own = ObservedRates(observed.row, observed.row[:, None])
         signals = of_signals = None
         if self._signals and self._variation.loops is not None:
