@@ -8,6 +8,8 @@ h^8 (nodal functions alone: h^4 in bending, h^2 in axial motion and torsion).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -140,7 +142,12 @@ class LineField:
         return (0,)
 
     def at(self, x: Real) -> LineValues:
-        """Rows over all coordinates, (n, size)."""
+        """Rows over all coordinates, (n, size); read-only, since they are kept."""
+        found: LineValues = _kept(LineField, self.mesh.nodes.tobytes(), np.asarray(x, float).tobytes())
+        return found
+
+    def rows(self, x: Real) -> LineValues:
+        """The same, evaluated anew."""
         element, xi, h = self.mesh.locate(x)
         local = line_shapes(xi, h)
         internal = self.mesh.elements + 1 + INTERNAL_LINE * element
@@ -178,7 +185,14 @@ class BendingField:
         return (0, 1)
 
     def at(self, x: Real) -> BendingValues:
-        """Rows over all coordinates, (n, size)."""
+        """Rows over all coordinates, (n, size); read-only, since they are kept."""
+        found: BendingValues = _kept(
+            BendingField, self.mesh.nodes.tobytes(), np.asarray(x, float).tobytes(), self.shear
+        )
+        return found
+
+    def rows(self, x: Real) -> BendingValues:
+        """The same, evaluated anew."""
         element, xi, h = self.mesh.locate(x)
         local = bending_shapes(xi, h, self.shear)
         internal = 2 * (self.mesh.elements + 1) + self._internal * element
@@ -199,6 +213,16 @@ class BendingField:
         motion[0:nodal:2, 1] = self.mesh.nodes
         motion[1:nodal:2, 1] = 1.0
         return motion
+
+
+@lru_cache(maxsize=32)
+def _kept(kind: type[LineField | BendingField], nodes: bytes, x: bytes, *shear: bool) -> Any:
+    """The rows of a field on a mesh of these nodes, at these positions: both planes have the same, and so has a beam of
+    which numbers differ that do not move its mesh, such as those by which it is differentiated."""
+    found = kind(ElementMesh(np.frombuffer(nodes)), *shear).rows(np.frombuffer(x))
+    for each in vars(found).values():
+        each.flags.writeable = False
+    return found
 
 
 def _spread(local: Real, columns: NDArray[np.intp], size: int) -> Real:
