@@ -1,9 +1,11 @@
 """Derivatives of the tables by many numbers at once: those that concern different entries are changed together.
 
-A scene is compiled four times or more for each derivative (`flexmb.parameters.spectral`). Numbers of different bodies
+A scene is compiled four times or more for each derivative by interpolation (`flexmb.parameters.spectral`). Numbers of different bodies
 change different entries of the tables. So each number is changed once to see which entries it concerns; then numbers
 with no entry in common are changed together, each by the same share of its scale, as one takes the columns of a sparse
-Jacobian together (Curtis, Powell & Reid 1974). A group in which anything is unexpected is differentiated one by one.
+Jacobian together (Curtis, Powell & Reid 1974). Where the entries of a number change in proportion at both of two
+points, on either side of its value, they are linear in it, and no more points are needed. A group in which anything is
+unexpected is differentiated one by one.
 """
 
 from __future__ import annotations
@@ -14,7 +16,11 @@ import numpy as np
 
 from flexmb.parameters.numbers import Number
 from flexmb.parameters.spectral import WIDTHS, Derivative, NotSmooth, Parts, derivative, nought
+from flexmb.parameters.steady import LINEAR
 from flexmb.typing import Flags, Index, Real
+
+BEHIND = float(np.sqrt(0.5))
+"""The distance of the second point over that of the first: not of its size, which would hide what is even or odd."""
 
 Tables = Callable[[Mapping[str, float]], Real]
 """All floats (n,) of the tables with other values, by name of the number; ValueError where there are none."""
@@ -26,14 +32,14 @@ def derivatives_together(
 ) -> list[Derivative]:  # fmt: skip
     """d tables/dp (n,) for each of these numbers; `by` finds it for one number, or says what is wrong with it. widths:
     those at which derivatives were found nearby, by name."""
-    if len(chosen) < 2:
-        return [by(each) for each in chosen]
     concerned = [_concerned(tables, each) for each in chosen]
     found = dict[int, Derivative]()
     for group in _groups(concerned):
-        if len(group) > 1:
-            first = min(widths.get(chosen[k].name, WIDTHS[0]) for k in group)
-            found |= _of_group(tables, chosen, concerned, group, parts, first)
+        found |= _linear(tables, chosen, concerned, group, parts)
+        left = [k for k in group if k not in found]
+        if len(left) > 1:
+            first = min(widths.get(chosen[k].name, WIDTHS[0]) for k in left)
+            found |= _of_group(tables, chosen, concerned, left, parts, first)
     return [found[k] if k in found else by(each) for k, each in enumerate(chosen)]
 
 
@@ -59,6 +65,30 @@ def _groups(concerned: Sequence[Flags | None]) -> list[list[int]]:
         else:
             found[place].append(k)
             taken[place] = taken[place] | own
+    return found
+
+
+def _linear(
+    tables: Tables, chosen: Sequence[Number], concerned: Sequence[Flags | None], group: Sequence[int], parts: Parts
+) -> dict[int, Derivative]:
+    """Derivatives by those numbers of a group in which the entries that they concern are linear, to what counts as
+    rounding in steady derivatives."""
+    middle = tables({})
+    allowed = LINEAR * parts.sizes(middle)
+    try:
+        now = tables({chosen[k].name: chosen[k].value - BEHIND * WIDTHS[0] * chosen[k].scale for k in group})
+    except ValueError:
+        return {}
+    own = {k: mask for k, mask in enumerate(concerned) if k in group and mask is not None}
+    elsewhere = ~np.any(list(own.values()), axis=0)
+    if np.any(np.abs(now - middle)[elsewhere] > allowed[elsewhere]):
+        return {}
+    found = dict[int, Derivative]()
+    for k, mask in own.items():
+        number, step = chosen[k], WIDTHS[0] * chosen[k].scale
+        change = np.where(mask, tables({number.name: number.value + step}) - middle, 0.0)
+        if np.all(np.abs(now - middle + BEHIND * change)[mask] <= allowed[mask]):
+            found[k] = Derivative(change / step, 0.0)
     return found
 
 

@@ -22,6 +22,7 @@ from flexmb.jain.elimination import ELIMINATIONS, Elimination
 from flexmb.kept import kept
 from flexmb.motion import coordinates
 from flexmb.scene import schema as s
+from flexmb.scene.garbage import collector_paused
 from flexmb.system import algorithms, labels
 from flexmb.system.algorithm import Algorithm, DynamicsAlgorithm, Route
 from flexmb.system.derivative_evaluator import DerivativeEvaluator
@@ -95,7 +96,7 @@ class System(Mechanics):
         Modes follow those of this scene, and equal functions of time are kept apart. The scene is not checked. Closures
         close the initial values of that scene, as those of a run of it do.
         """
-        with asking(kernels_of(self)):
+        with asking(kernels_of(self)), collector_paused():
             return System(scene, self._asked, self.scene, closed=self.constraints is not None)
 
     # Closures

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import flexmb as fm
 from flexmb.parameters import parameters, together
 from flexmb.parameters.parameters import ParameterError
+from flexmb.parameters.spectral import Parts
 from flexmb.ready import scenes
 
 BY = [
@@ -66,3 +69,28 @@ def test_entries_that_change_unexpectedly_break_up_the_group(monkeypatch):
     alone = np.column_stack([tables(arm(), [name]) for name in BY])
     monkeypatch.setattr(together, "_concerned", incomplete)
     assert np.max(np.abs(tables(arm(), BY) - alone)) < 1e-11 * np.max(np.abs(alone))
+
+
+@pytest.mark.parametrize(
+    ("bent", "straight"),
+    [
+        (lambda x: 3.0 * x, True),
+        (lambda x: 3.0 * x + 1e-9 * abs(x - 2.0), False),
+        (lambda x: 3.0 * x + 1e-9 * (x - 2.0) ** 2, False),
+        (lambda x: 3.0 * x + 1e-9 * (x - 2.0) ** 3, False),
+        (lambda x: 3.0 * x + 1e-9 * max(x - 2.1, 0.0), False),
+    ],
+)
+def test_two_points_suffice_only_where_entries_are_linear(bent, straight):
+    """Negative controls: a bend of a billionth is seen, be it even or odd, at the value or beside it."""
+    pair = [SimpleNamespace(name=name, value=2.0, scale=2.0) for name in "ab"]
+
+    def tables(values):
+        a, b = (values.get(name, 2.0) for name in "ab")
+        return np.array([1.0, bent(a), 5.0 * b])
+
+    found = together._linear(
+        tables, pair, [together._concerned(tables, each) for each in pair], [0, 1], Parts([slice(0, 3)])
+    )
+    assert (0 in found) is straight
+    assert found[1].values == pytest.approx([0.0, 0.0, 5.0], rel=1e-14)
