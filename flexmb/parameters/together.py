@@ -1,11 +1,11 @@
 """Derivatives of the tables by many numbers at once: those that concern different entries are changed together.
 
-A scene is compiled four times or more for each derivative by interpolation (`flexmb.parameters.spectral`). Numbers of different bodies
-change different entries of the tables. So each number is changed once to see which entries it concerns; then numbers
-with no entry in common are changed together, each by the same share of its scale, as one takes the columns of a sparse
-Jacobian together (Curtis, Powell & Reid 1974). Where the entries of a number change in proportion at both of two
-points, on either side of its value, they are linear in it, and no more points are needed. A group in which anything is
-unexpected is differentiated one by one.
+A scene is compiled four times or more for each derivative by interpolation (`flexmb.parameters.spectral`). Numbers of
+different bodies change different entries of the tables. So each number is changed once to see which entries it
+concerns; then numbers with no entry in common are changed together, each by the same share of its scale, as one takes
+the columns of a sparse Jacobian together (Curtis, Powell & Reid 1974). Where the entries of a number change in
+proportion at both of two points, on either side of its value, they are linear in it, and no more points are needed. A
+group in which anything is unexpected is differentiated one by one.
 """
 
 from __future__ import annotations
