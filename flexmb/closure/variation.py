@@ -35,6 +35,7 @@ from flexmb.entry.variation import (
 from flexmb.jit.direct import Direct, direct
 from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR
 from flexmb.kept import kept
+from flexmb.tables.functions import any_varies
 from flexmb.typing import Index, Real
 
 
@@ -53,7 +54,7 @@ class ChainVariation:
         else:
             self._chain, self._x, self._rows = closures.chain_in(like._chain), like._x, like._rows
         s = self._chain
-        self.motion = CoordinateMotion(s.c, s.w)
+        self.motion = CoordinateMotion(s.c, len(s.w.q))
         self._differentiate = direct(differentiate_chain, STATUS, REAL, VECTOR, s, self._x)
         rows = s.c, dual, s.cc, self._rows
         self._differentiate_by_time = direct(change_by_time, STATUS, REAL, VECTOR, VECTOR, VECTOR, *rows)
@@ -81,11 +82,11 @@ class ChainVariation:
             none,
         )  # fmt: skip
         whole = FreeVariation(*found, rows)
-        return self._with_time(t, y, whole) if len(s.c.function) else whole
+        return self._with_time(t, y, whole) if any_varies(s.c.function) else whole
 
     def of_accelerations(self, t: float, y: Real) -> VariedAccelerations:
         """The same without the rows, which functions of time alone need for the accelerations."""
-        if len(self._chain.c.function):
+        if any_varies(self._chain.c.function):
             return VariedAccelerations(*self.at(t, y)[:3])
         return self._differentiated(t, y)
 
@@ -96,7 +97,7 @@ class ChainVariation:
         self._closures.check(self._differentiate(t, y), int(x.fault[0]))
         rates = x.speed["acceleration"].copy()
         of_rates = ByAllDirections(x.by_displacement.copy(), x.by_speed.copy(), x.by_force.copy(), np.zeros(len(rates)))
-        return VariedAccelerations(rates, of_rates, self.motion.at(t, y))
+        return VariedAccelerations(rates, of_rates, self.motion.at(y))
 
     @kept
     def _stiffen(self) -> Direct:
@@ -109,7 +110,7 @@ class ChainVariation:
         self._closures.expect_rows(self._chain)
         self._closures.check(self._stiffen(t, y, rates, stiffness, mass), int(x.fault[0]))
         J = x.chain.changes.jacobian[:, x.chain.tree.tables.place]
-        return Stiffness(rates, stiffness, mass, J, self.motion.at(t, y))
+        return Stiffness(rates, stiffness, mass, J, self.motion.at(y))
 
     def _with_time(self, t: float, y: Real, found: FreeVariation) -> FreeVariation:
         """The same with derivatives by time."""

@@ -12,12 +12,14 @@ import numpy as np
 
 from flexmb.entry.derivatives import DerivativeWorkspace, acceleration_derivatives, stiffness_and_mass
 from flexmb.entry.tangent import TangentWorkspace, time_derivative
+from flexmb.jit.bundle import bundle
 from flexmb.jit.direct import Direct, direct
 from flexmb.jit.kernel import helper, kernel
 from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR, VOID
 from flexmb.kept import kept
-from flexmb.motion.coordinates import configuration_rate, load_state
-from flexmb.tables.arrays import Constants, Workspace
+from flexmb.motion.coordinates import configuration_rate
+from flexmb.tables.arrays import Constants
+from flexmb.tables.functions import any_varies
 from flexmb.typing import Index, Real
 
 MOST_SPEEDS = 6  # of a hinge
@@ -102,37 +104,45 @@ class Stiffness(NamedTuple):
 Check = Callable[[int, int], None]  # raises unless a status is OK; the second number is the body or closure at fault
 
 
+@bundle
+class RateScratch:
+    """What `coordinate_motion` writes beside its result: no evaluation of the motion reads it."""
+
+    raw: Real  # (nq,) coordinates
+    u: Real  # (nu,) speeds
+    rate: Real  # (nq,) qdot
+
+
 class CoordinateMotion:
-    """N (nq,nu) of one system for one thread; w: a workspace of its tree."""
+    """N = d(qdot)/du (nq,nu) of one system, for one thread."""
 
-    def __init__(self, c: Constants, w: Workspace) -> None:
-        self._shape, self._turns = (len(w.q), len(w.u)), bool(np.any(c.body["quaternion"] >= 0))
-        self._move = direct(coordinate_motion, VOID, REAL, VECTOR, MATRIX, c, w)
+    def __init__(self, c: Constants, nq: int) -> None:
+        self._shape, self._turns = (nq, len(c.speed)), bool(np.any(c.body["quaternion"] >= 0))
+        scratch = RateScratch(np.zeros(nq), np.zeros(len(c.speed)), np.zeros(nq))
+        self._move = direct(coordinate_motion, VOID, VECTOR, MATRIX, c, scratch)
 
-    def at(self, t: float, y: Real) -> Real:
+    def at(self, y: Real) -> Real:
         """At y = [q, u, work]; the same read-only array wherever there are no quaternions."""
-        return self._found(t, y) if self._turns else self._constant
+        return self._found(y) if self._turns else self._constant
 
     @kept
     def _constant(self) -> Real:
-        found = self._found(0.0, np.zeros(sum(self._shape) + 1))
+        found = self._found(np.zeros(self._shape[0]))
         found.flags.writeable = False
         return found
 
-    def _found(self, t: float, y: Real) -> Real:
+    def _found(self, y: Real) -> Real:
         N = np.zeros(self._shape)
-        self._move(t, y, N)
+        self._move(y, N)
         return N
 
 
 class TreeVariation:
-    """How the motion of one tree changes, for one thread; `dual`: tables for dual numbers, `real`: any workspace."""
+    """How the motion of one tree changes, for one thread; `dual`: tables for dual numbers."""
 
-    def __init__(
-        self, c: Constants, w: DerivativeWorkspace, dual: TangentWorkspace, real: Workspace, check: Check
-    ) -> None:
-        self._w, self._dual, self._check, self.motion = w, dual, check, CoordinateMotion(c, real)
-        self._is_driven, n = bool(len(c.function)), len(c.speed)
+    def __init__(self, c: Constants, w: DerivativeWorkspace, dual: TangentWorkspace, check: Check) -> None:
+        self._w, self._dual, self._check, n = w, dual, check, len(c.speed)
+        self.motion = CoordinateMotion(c, len(w.sweeps.q))
         self._differentiate = direct(acceleration_derivatives, STATUS, REAL, VECTOR, MATRIX, MATRIX, MATRIX, c, w)
         self._differentiate_by_time = direct(time_derivative, STATUS, REAL, VECTOR, VECTOR, c, dual)
         self._constants = c
@@ -155,11 +165,11 @@ class TreeVariation:
         by_state_and_force = np.empty((nu, nu)), np.empty((nu, nu)), np.empty((nu, nu))
         self._check(self._differentiate(t, y, *by_state_and_force), int(self._w.fault[0]))
         rates, by_time = self._w.sweeps.speed["acceleration"].copy(), np.zeros(nu)
-        if self._is_driven:
+        if any_varies(self._constants.function):
             drift = np.empty_like(y)
             self._check(self._differentiate_by_time(t, y, drift), int(self._dual.fault[0]))
             by_time = drift[-1 - nu : -1]
-        return VariedAccelerations(rates, ByAllDirections(*by_state_and_force, by_time), self.motion.at(t, y))
+        return VariedAccelerations(rates, ByAllDirections(*by_state_and_force, by_time), self.motion.at(y))
 
     @kept
     def _stiffen(self) -> Direct:
@@ -171,28 +181,29 @@ class TreeVariation:
         nu = len(self._w.sweeps.u)
         rates, stiffness, mass = np.empty(nu), np.empty((nu, nu)), np.empty((nu, nu))
         self._check(self._stiffen(t, y, rates, stiffness, mass), int(self._w.fault[0]))
-        return Stiffness(rates, stiffness, mass, self._no_rows.J, self.motion.at(t, y))
+        return Stiffness(rates, stiffness, mass, self._no_rows.J, self.motion.at(y))
 
 
 @kernel
-def coordinate_motion(t, y, N, c, w):
-    """N (nq,nu) = d(qdot)/du at y = [q, u, work], into zeros; the columns of prescribed speeds vanish.
+def coordinate_motion(y, N, c, x):
+    """N (nq,nu) = d(qdot)/du at y = [q, ...], into zeros; the columns of prescribed speeds vanish. x: `RateScratch`.
 
     One evaluation for the first speeds of all hinges, then one for the second ones ...: no hinge depends on another.
     """
-    load_state(t, y, c, w)
+    for i in range(N.shape[0]):
+        x.raw[i] = y[i]
     for j in range(N.shape[1]):
-        w.u[j] = 0.0
+        x.u[j] = 0.0
     for n in range(MOST_SPEEDS):
         for k in range(c.body.shape[0]):
-            _set_speed(c, w, k, n, 1.0)
-        configuration_rate(c, w, w.rate)
+            _set_speed(c, x, k, n, 1.0)
+        configuration_rate(c, x, x.rate)
         for k in range(c.body.shape[0]):
             if n < c.body[k].nv:
                 first = c.body[k].q_index
                 for i in range(first, first + c.body[k].nv + (1 if c.body[k].quaternion >= 0 else 0)):
-                    N[i, c.body[k].u_index + n] = w.rate[i]
-            _set_speed(c, w, k, n, 0.0)
+                    N[i, c.body[k].u_index + n] = x.rate[i]
+            _set_speed(c, x, k, n, 0.0)
     for k in range(c.body.shape[0]):
         for n in range(c.body[k].modes):
             N[c.body[k].eta_index + n, c.body[k].etad_index + n] = 1.0
@@ -202,11 +213,11 @@ def coordinate_motion(t, y, N, c, w):
 
 
 @helper
-def _set_speed(c, w, k, n, value):
+def _set_speed(c, x, k, n, value):
     """Speed n of the hinge of body k, if it has so many and this one is free."""
     j = c.body[k].u_index + n
     if n < c.body[k].nv and c.speed[j].prescribed < 0:
-        w.u[j] = value
+        x.u[j] = value
 
 
 def displacement_of(N: Real) -> Real:

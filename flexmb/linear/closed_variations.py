@@ -99,9 +99,10 @@ class ClosedEquations(Equations):
         return observation.undetermined(spread.open_parts if spread else {})
 
     def loads(self, state: State, at: RestForces) -> Real:
-        found = self.free_variation(state)
-        left = self._freedom(self.mass(state), found.rows.J[:, self.free])
-        return left.basis(at.chosen).T @ left.mass @ found.accelerations[self.free]
+        found, free = self._free.stiffness(state.t, pack(state)), self.free
+        self._examine(state)
+        left = self._freedom(self._among_free(found.mass), found.J[:, free])
+        return left.basis(at.chosen).T @ left.mass @ found.accelerations[free]
 
     def _independent(self, mass: Real, J: Real) -> tuple[Index, Real]:
         left = self._freedom(mass, J)

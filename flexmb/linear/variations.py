@@ -155,7 +155,7 @@ class Equations:
 
     @per_thread
     def _free(self) -> TreeVariation | ChainVariation:
-        return TreeVariation(self.constants, self._derivatives, self._w, self._real_w, self.system.check_status)
+        return TreeVariation(self.constants, self._derivatives, self._w, self.system.check_status)
 
     @per_thread
     def pushforward(self) -> Pushforward:

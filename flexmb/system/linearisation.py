@@ -34,6 +34,7 @@ from flexmb.system.load_axes import Axes, referred
 from flexmb.system.mechanics import Mechanics
 from flexmb.system.pushforward import Directions, GivenMotion, Pushforward, pushforward
 from flexmb.system.section_loads import SectionBalance
+from flexmb.tables.functions import any_varies
 from flexmb.tables.per_thread import per_thread
 from flexmb.tables.state import State, finite_result
 from flexmb.typing import Index, Real
@@ -88,7 +89,7 @@ class Linearisation:
             finite_result(part, t)
         return InverseDynamicsDerivatives(
             self._system.inverse_dynamics(state, rates), by_displacement, by_speed, M,
-            self._inverse_by_time(t, y, rates), self._variations.motion.at(t, y),
+            self._inverse_by_time(t, y, rates), self._variations.motion.at(y),
         )  # fmt: skip
 
     def of_evaluation(self, state: State, accelerations: Real | None) -> Any:
@@ -144,12 +145,12 @@ class Linearisation:
     def _variations(self) -> TreeVariation | ChainVariation:
         if self._constraints is not None:
             return self._constraints.variation(self._system.own_tangent)
-        w = self._system.own_derivatives, self._system.own_tangent, self._system.own_workspace
+        w = self._system.own_derivatives, self._system.own_tangent
         return TreeVariation(self._system.constants, *w, self._system.check_status)
 
     def _inverse_by_time(self, t: float, y: Real, rates: Real) -> Real:
         """The same of inverse dynamics at these accelerations (nu,)."""
-        if not len(self._system.constants.function):
+        if not any_varies(self._system.constants.function):
             return np.zeros(self._system.nu)
         motion, push = GivenMotion(t, y, rates, np.zeros(self._row_count)), self._pushforward
         later = self._directions(np.zeros((self._system.nq, 0)), 0)
@@ -278,7 +279,7 @@ class Linearisation:
 
     def _as_given(self, t: float, y: Real, rates: Real) -> tuple[GivenMotion, Directions]:
         """A motion with these accelerations, and its changes by displacements, speeds, accelerations and time."""
-        directions = self._directions(self._variations.motion.at(t, y), self._system.nu)
+        directions = self._directions(self._variations.motion.at(y), self._system.nu)
         directions.accelerations[:, 2 * self._system.nu : -1] = np.eye(self._system.nu)
         return GivenMotion(t, y, rates, np.zeros(0)), directions
 

@@ -55,6 +55,11 @@ def pack(functions: Sequence[Function]) -> tuple[Record, Real]:
     return out, np.array(pieces, dtype=float).reshape(-1, 8)
 
 
+def any_varies(functions: Record) -> bool:
+    """Whether the values of any of these functions change with time; those that controllers write are held."""
+    return bool(np.any(functions["kind"] != _CONSTANT))
+
+
 @helper
 def _smooth_step(a, b, begin, duration, t):
     x = (t - begin) / duration

@@ -18,8 +18,10 @@ import pytest
 import flexmb as fm
 from flexmb.closure import dynamics
 from flexmb.closure.tables import Closed, ClosureWorkspace
+from flexmb.closure.variation import ChainVariation
 from flexmb.jit.counting import Interpreter, _counting, _scalars
 from flexmb.scene.schema import Scene
+from flexmb.tables.arrays import Workspace
 from tests.flexmb.closure.test_jacobian import MOVING
 from tests.repo.project import ROOT
 
@@ -50,6 +52,10 @@ KEPT = {
 }  # fmt: skip
 
 
+# Of workspaces of trees: where ports are at rest, and the ground, are there from the beginning.
+LASTS_IN_TREES = {"port", "ground", "displaced"}
+
+
 def test_every_field_is_scratch_or_found_or_kept() -> None:
     """A new one has to be decided about."""
     assert {each.name for each in fields(ClosureWorkspace)} == SCRATCH | FOUND | KEPT
@@ -78,9 +84,14 @@ def test_only_these_write_the_loads_that_act() -> None:
     assert {name: functions for name, functions in found.items() if functions} == WRITERS | OF_DUALS
 
 
-def spaces() -> list[ClosureWorkspace]:
-    """All workspaces of closures that there are."""
-    return [each for each in gc.get_objects() if type(each) is ClosureWorkspace]
+def written() -> list[Any]:
+    """What calls write, of all workspaces of closures and trees that there are."""
+    spaces = [each for each in gc.get_objects() if isinstance(each, ClosureWorkspace | Workspace)]
+    of_trees = {each.name for each in fields(Workspace)} - LASTS_IN_TREES
+    return [
+        getattr(each, name) for each in spaces
+        for name in (SCRATCH | FOUND if isinstance(each, ClosureWorkspace) else of_trees)
+    ]  # fmt: skip
 
 
 def poison(table: Any) -> None:
@@ -158,12 +169,26 @@ def test_every_door_answers_the_same_with_poisoned_tables(name: str) -> None:
     system = fm.compile(scenes()[name]())
     asked = doors(system)
     expected = {each: ask() for each, ask in asked.items()}
-    there = spaces()
+    tables = written()
     for each, ask in reversed(asked.items()):
-        for space in there:
-            for field in SCRATCH | FOUND:
-                poison(getattr(space, field))
+        for table in tables:
+            poison(table)
         assert same(ask(), expected[each]), each
+
+
+@pytest.mark.parametrize("name", ["driven flexible four-bar", "closed_chains/geared_hoist"])
+def test_the_change_of_coordinates_leaves_the_motion_as_it_is(name: str) -> None:
+    """N is found last, elsewhere than the motion: whoever reads the chain afterwards finds the state that was asked.
+
+    Both have no quaternions, so that N is found once, at other coordinates. It was found in the chain.
+    """
+    system = fm.compile(scenes()[name]())
+    state, variation = system.initial_state, ChainVariation(system.closures, system.own_tangent)
+    found, w = variation.at(state.t, state.y), variation._chain.w
+    assert np.any(state.q) and np.array_equal(w.q, state.q) and np.array_equal(w.u, state.u)
+    assert np.array_equal(w.speed["acceleration"], found.accelerations)
+    poison(w)
+    assert np.array_equal(variation.motion.at(state.y), found.motion)
 
 
 class Poisoning(Interpreter):

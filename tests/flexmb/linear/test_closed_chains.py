@@ -11,7 +11,9 @@ import pytest
 from numpy.polynomial import Chebyshev
 
 import flexmb as fm
+from flexmb.linear.closed_variations import ClosedEquations
 from flexmb.linear.linear_model import LinearModel
+from flexmb.linear.variations import Equations
 from flexmb.scene import schema as s
 from flexmb.scene.shapes import beam_section
 from flexmb.system.pushforward import GivenMotion
@@ -85,6 +87,29 @@ def test_derivatives_are_those_of_the_closed_chain(name):
         stiffest = np.max(np.abs(expected))  # of closing the loops to 1e-14 this is what is left
         assert np.all(np.abs(found - expected) <= 2e-7 * np.max(np.abs(expected), axis=0) + 1e-10 * stiffest + 1e-8)
     assert np.array_equal(model.A[:n], np.eye(n, 2 * n, n))
+
+
+def refused(*_):
+    raise AssertionError("this is not asked for")
+
+
+@pytest.mark.parametrize("tree", [True, False])
+def test_only_what_changes_and_is_asked_for_is_differentiated(tree, monkeypatch):
+    """By time nothing where functions are held; of loads nothing at all. Functions that vary are differentiated."""
+    scene = MOVING["driven four-bar with modes"]()
+    system = fm.compile(msgspec.structs.replace(scene, closures=()) if tree else scene)
+    moving = (Equations if tree else ClosedEquations)(system)
+    held, start = moving.held(0.0), system.initial_state
+    state = held.on_functions(replace(start, u=np.zeros_like(start.u)))
+    expected, at = held.variations(state), held.forces(state)
+    assert not expected.drift.any() and moving.variations(start).drift.any()
+    for equations in (held, moving):
+        monkeypatch.setattr(equations._free, "_differentiate_by_time", refused)
+    assert np.array_equal(held.variations(state).A, expected.A)
+    with pytest.raises(AssertionError, match="not asked for"):
+        moving.variations(start)
+    monkeypatch.setattr(held._free, "_differentiate", refused)
+    assert held.loads(state, at) == pytest.approx(at.load, rel=1e-9, abs=1e-9 * np.max(np.abs(at.load)))
 
 
 def test_without_the_closure_loads_stiffness_is_another():
