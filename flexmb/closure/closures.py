@@ -264,6 +264,13 @@ class Closures:
         drives = np.where(s.c.speed["prescribed"] >= 0, s.w.speed["drive"], 0.0)
         return ClosedMotion(s.w.speed["acceleration"].copy(), drives, hinges, closures)
 
+    @staticmethod
+    def begin_in(s: Closed, t: float, y: Real) -> None:
+        """Have a chain choose its independent rows at y = [q, u, work], which fulfils the closures, as where a run
+        begins. If they are singular there, the next right-hand side of the chain says so."""
+        s.cw.time[0] = -np.inf  # nothing went before
+        dynamics.project(t, y.copy(), s)
+
     # Newton steps for initial conditions
 
     def linearise(self, t: float, y: Real) -> None:

@@ -98,6 +98,11 @@ class Blocks:
             )
         return found
 
+    def choose_rows(self, t: float, y: Real) -> None:
+        """Have a chain choose its independent rows at y = [q, u, work]."""
+        if self.system.closures is not None:
+            self.system.closures.begin_in(self.chain, t, y)
+
     def __len__(self) -> int:
         return len(self.tables)
 

@@ -20,6 +20,7 @@ from flexmb.run.switching import clock_of
 from flexmb.sensitivity import flow
 from flexmb.sensitivity.blocks import Blocks, ObservedRates
 from flexmb.sensitivity.loops import Loops
+from flexmb.system.pushforward import Directions, GivenMotion, pushforward
 from flexmb.tables.state import DynamicsError
 from flexmb.tables.status import OK, Status
 from flexmb.typing import Real
@@ -51,6 +52,7 @@ class Variation:
             where[flow.CONTROL], where[flow.FOLLOW] = loops.steer, loops.follow
             law, law_rate, continuous = loops.law, loops.law_rate, loops.continuous
         self._width = n + len(continuous)
+        self._motion = np.r_[: n - 1, self._width - 1]
         self.flow = flow.VariationalFlow(
             address=where, block=np.array(blocks.where), loop=np.array(loops.where if loops else [0] * B),
             output=np.array([address(each) for each in blocks.outputs]), load=np.array(blocks.where_loads),
@@ -73,11 +75,13 @@ class Variation:
         """The rates of a state and of its derivatives; DynamicsError where they do not exist."""
         z = self.joined(at)
         rates = np.zeros(len(z))
+        self._choose_rows(t, z)
         self.check(flow.rhs(t, z, rates, self.flow, self.flow), t)
         return self.parted(rates)
 
     def put(self, t: float, z: Real) -> None:
         """Evaluate all blocks at a state that is `joined` with its derivatives."""
+        self._choose_rows(t, z)
         for b in range(len(self.blocks)):
             self.check(flow.evaluate_at(t, z, b, self.flow), t)
 
@@ -85,9 +89,13 @@ class Variation:
         """Everything observable at times (T,), in states (T,.) that are `joined` with their derivatives."""
         T, m, P = len(times), self.blocks.every.shape[1], self.blocks.directions
         found = ObservedRates(np.empty((T, m)), np.empty((T, m, P)))
-        status, count = flow.observe_at(times, states, *found, self.flow)
-        if status != OK:
-            self.check(status, float(times[count]))
+        # A chain chooses its rows anew for each time; all times of a tree are observed in one call.
+        parts = [slice(0, T)] if self.blocks.system.closures is None else [slice(i, i + 1) for i in range(T)]
+        for part in parts if T else ():
+            self._choose_rows(float(times[part.start]), states[part.start])
+            status, count = flow.observe_at(times[part], states[part], *(each[part] for each in found), self.flow)
+            if status != OK:
+                self.check(status, float(times[part.start + count]))
         return found
 
     def observed_at(self, t: float, at: Course) -> ObservedRates:
@@ -95,22 +103,41 @@ class Variation:
         found = self.observed(np.array([t]), self.joined(at)[None])
         return ObservedRates(found.row[0], found.rates[0])
 
+    def _choose_rows(self, t: float, z: Real) -> None:
+        """Have a chain choose its independent rows where it is evaluated, or where a run begins: integrators do at each
+        step that they accept, but nothing may have been integrated, or another run to somewhere else."""
+        self.blocks.choose_rows(t, z.reshape(self._width, -1)[self._motion, 0])
+
     def take(self, at: Course) -> None:
         """Set the states of all blocks without evaluating them."""
         tables = self.flow
-        motion = np.r_[: self._width - 1 - len(tables.continuous), self._width - 1]
-        laws = np.arange(len(motion) - 1, self._width - 1)
+        motion, laws = self._motion, np.arange(len(self._motion) - 1, self._width - 1)
         for b, (state, law) in enumerate(zip(tables.state, tables.law, strict=True)):
             lanes = slice(LANES * b, min(LANES * (b + 1), at.Y.shape[1]))
             state[:, 0], state[:, 1 : 1 + lanes.stop - lanes.start] = at.y[motion], at.Y[motion, lanes]
             law[tables.continuous, 0] = at.y[laws]
             law[tables.continuous, 1 : 1 + lanes.stop - lanes.start] = at.Y[laws, lanes]
 
-    def energy_rates(self, t: float, at: Course) -> Real:
-        """The derivatives (P,) of the energy at a state."""
+    def energy_rates(self, t: float, at: Course, dt: Real) -> Real:
+        """The derivatives (P,) of the energy at a state whose time (s) changes by dt (P,)."""
         place, _ = self.blocks.system.observation.columns["energy"]
         rates: Real = np.sum(self.observed_at(t, at).rates[place], axis=0)
-        return rates
+        return rates + self._energy_by_time(t, at.y) * dt if np.any(dt) else rates
+
+    def _energy_by_time(self, t: float, y: Real) -> Real:
+        """The explicit derivative () of the energy by time: what is prescribed moves on, whatever its entries in y are."""
+        system = self.blocks.system
+        c, observation, chain = system.constants, system.observation, system.closures
+        if not np.any(c.speed["prescribed"] >= 0):
+            return np.zeros(())
+        place, _ = observation.columns["energy"]
+        closures = None if chain is None else chain.constants[1]
+        push = pushforward(c, system.own_tangent, observation.out, system.check_status, closures)
+        n, none = system.nq + system.nu, np.zeros((system.nu, 1))
+        loads = np.zeros((0 if closures is None else len(closures.row), 1))
+        at = GivenMotion(t, np.concatenate([y[:n], y[-1:]]), none[:, 0], loads[:, 0])
+        later = Directions(np.zeros((n, 1)), none, loads, np.ones(1))
+        return np.asarray(np.sum(push.derivatives(at, later, lambda lanes: push.row(lanes)[place])))
 
     def check(self, status: int, t: float) -> None:
         """DynamicsError with the time, unless a status is OK."""
@@ -122,6 +149,7 @@ class Variation:
     def integrate(self, start: Course, times: Real, clock: Clock, settings: Settings) -> Real:
         """The state with its derivatives, `joined`, at these times (T,) s, from the first to the last."""
         z, P = self.joined(start), self.blocks.directions
+        self._choose_rows(float(times[0]), z)
         plain = settings.accuracy(self.blocks.system.nq, self.blocks.system.nu)
         steps = self.leg.raw.counts[ACCEPTED] + self.leg.raw.counts[REJECTED]
         most = min(settings.max_steps, MORE_STEPS * steps + FEW_STEPS)

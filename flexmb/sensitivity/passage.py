@@ -93,7 +93,7 @@ class Passage:
                 "which comes first changes what follows, so that the run has no derivative beyond; move one of them"
             )
         if after.changes:  # the work includes the energy that changes of values bring
-            at.Y[-1] += variation.energy_rates(t, at) - self._energy
+            at.Y[-1] += variation.energy_rates(t, at, after.dt) - self._energy
         if np.any(after.dt):
             at = Course(y, at.Y - np.outer(variation.slope(t, at).y, after.dt))
         return at
@@ -110,6 +110,6 @@ class Passage:
         found = jumped(variation, end, self._levels, {} if self.after is None else self.after.held, tolerance)
         if found.changes:
             self._changes += found.changes
-            self._energy = variation.energy_rates(leg.raw.t, Course(end.y, found.D))
+            self._energy = variation.energy_rates(leg.raw.t, Course(end.y, found.D), found.dt)
         self.after = found
         return found

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from flexmb.closure.dynamics import project
+from flexmb.closure.closures import Closures
 from flexmb.entry.pulled import pull_workspace
 from flexmb.jain.derivatives.pull_tables import ARMATURE, DAMPING, REST, STIFFNESS
 from flexmb.jain.derivatives.tables import ports_in_use
@@ -78,8 +78,7 @@ class Transposes:
     def choose(self, t: float, y: Real) -> None:
         """Choose the independent rows of closures for times up to t (s), near the state y there."""
         for chain in self._chains:
-            chain.cw.time[0] = -np.inf  # nothing went before
-            project(t, y.copy(), chain)
+            Closures.begin_in(chain, t, y)
 
     def by_driven(self) -> Real:
         """(F,) by what controllers drive, since the last call."""

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 import flexmb as fm
 from flexmb.ready import scenes
-from flexmb.sensitivity import part_scene
+from flexmb.sensitivity import leg, part_scene
+from tests.flexmb.closure.mechanisms import four_bar
 from tests.flexmb.sensitivity.differences import differences, relative_error
 from tests.flexmb.sensitivity.test_sensitivities import CLOSE, arm
 
@@ -68,6 +70,59 @@ def test_leaving_out_what_a_value_changes_to_is_noticed(monkeypatch, found):
     other = fm.sensitivities(changing(), T_END, [BY["a stiffness"]], OF, samples=11)
     assert not np.any(other.derivatives[-1])
     assert np.all(found.derivatives[-1, :, 0])
+
+
+def carried() -> fm.Scene:
+    """A rod on a carriage that is driven upwards."""
+    builder = fm.SceneBuilder("carried", gravity=(0.0, 0.0, -9.81))
+    builder.rigid_body("carriage", mass=2.0, inertia=(1.0, 1.0, 1.0))
+    builder.rigid_body("rod", mass=1.0, com=(0.4, 0.0, 0.1), inertia=(0.1, 0.2, 0.2))
+    lift = fm.Sine(amplitude=0.3, angular_frequency_rad_s=3.0)
+    builder.prismatic("rail", "ground", "carriage", axis=(0, 0, 1), prescribed=lift)
+    return builder.revolute("pin", "carriage", "rod", axis=(0, 1, 0)).scene()
+
+
+def changed_at(t: float, scene: fm.Scene, *changes: fm.Change) -> fm.Scene:
+    return replace(scene, events=(fm.schema.SceneEvent(name="now", watch="time", level=t, actions=changes),))
+
+
+def test_what_is_prescribed_moves_on_until_values_change(monkeypatch):
+    """The work by the instant of a change, which brings more energy the higher bodies are then."""
+    heavier = fm.Change(path="gravity_m_s2.2", value=-12.0), fm.Change(path="rod.mass_kg", value=1.5)
+    scene, t_end, of = changed_at(0.2, carried(), *heavier), 0.5, ["work"]
+    expected = differences(scene, t_end, "now.level", of, 1e-3, samples=3, levels=2)
+
+    def error():
+        found = fm.sensitivities(scene, t_end, ["now.level"], of, samples=3)
+        return np.max(relative_error(found, "now.level", expected))
+
+    assert error() < CLOSE
+    adjoint = fm.gradient(scene, t_end, ["now.level"], fm.FinalValue("work"))
+    assert adjoint.derivatives[0] == pytest.approx(expected.outputs[-1, 0], rel=CLOSE)
+    monkeypatch.setattr(leg.Variation, "_energy_by_time", lambda *_: np.zeros(()))  # as it was
+    assert error() > 0.01
+
+
+def test_the_work_of_a_driven_loop_does_not_depend_on_when_values_change():
+    """It is the energy at the end, where everything is prescribed, less that at the start."""
+    turn = fm.Sine(amplitude=0.3, angular_frequency_rad_s=3.0, offset=1.0)
+    scene = changed_at(0.2, four_bar(prescribed=turn), fm.Change(path="coupler.mass_kg", value=1.5))
+    found = fm.sensitivities(scene, 0.5, ["now.level", "crank.mass_kg"], ["work"], samples=2)
+    level, mass = found.derivatives[-1, 0]
+    assert abs(level) < 1e-9 < 0.1 < abs(mass)
+
+
+@pytest.mark.parametrize("closure", ["revolute", "cylindrical"])
+def test_loops_choose_their_rows_behind_a_change(closure):
+    """In the plane these closures have rows that depend on others; without them the motion is the same."""
+    heavier = fm.Change(path="coupler.mass_kg", value=1.5)
+    one, other = (changed_at(0.2, four_bar(closure=each), heavier) for each in (closure, "spherical"))
+    by, of = ["now.level", "crank.mass_kg"], ["work", "joint.position.y"]
+    found, expected = (fm.sensitivities(each, 0.5, by, of, samples=3).derivatives for each in (one, other))
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-7 * np.max(np.abs(expected)))
+    here = fm.gradient(four_bar(closure=closure), 0.5, by[1:], fm.FinalValue(of[1]))
+    there = fm.gradient(four_bar(closure="spherical"), 0.5, by[1:], fm.FinalValue(of[1]))
+    assert here.derivatives == pytest.approx(there.derivatives, rel=1e-7)
 
 
 def test_a_fit_finds_what_a_value_changes_to():
