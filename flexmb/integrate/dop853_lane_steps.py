@@ -51,7 +51,7 @@ def attempt(problem, s, entries, control, accuracy, counts):
         return OK
     for lane in range(LANES):
         entries.time[0, lane] = control.end[lane]
-    problem.project(problem.stages, problem.constants)
+    problem.project(problem.stages, problem.manifold)
     copy(s.trial, s.y_new)
     for lane in range(LANES):
         entries.time[0, lane] = min(control.end[lane], control.last[lane])

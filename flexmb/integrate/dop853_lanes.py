@@ -70,7 +70,7 @@ def _store_samples(problem, s, entries, control, times, out, counts):
                     entries.time[0, lane] = time
                     entries.fraction[0, lane] = (time - control.t[lane]) / (control.end[lane] - control.t[lane])
             interpolate(s.y, s.f, s.fraction[0], s.trial)
-            problem.project(problem.stages, problem.constants)
+            problem.project(problem.stages, problem.manifold)
         for lane in range(LANES):
             if entries.chosen[0, lane] == 1.0 and awaits_sample(control, times, counts, lane):
                 sample = counts[lane, SAMPLES]

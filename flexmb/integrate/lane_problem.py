@@ -61,7 +61,7 @@ class LaneProblem(NamedTuple):
     """y' = f(t, y) for LANES states y.
 
     rhs(stages, constants, workspace) puts f of stages.trial into stages.k[stages.stage[0]] and returns a status code,
-    OK unless no lane has a derivative; project(stages, constants) puts stages.trial back on its manifold.
+    OK unless no lane has a derivative; project(stages, manifold) puts stages.trial back on its manifold.
     """
 
     rhs: Pointer
@@ -69,6 +69,7 @@ class LaneProblem(NamedTuple):
     stages: AnyBundle
     constants: AnyBundle
     workspace: AnyBundle
+    manifold: AnyBundle
 
 
 def lane_stages(n: int) -> LaneStages:
@@ -93,6 +94,7 @@ def lane_problem(rhs: Any, project: Any, stages: LaneStages, constants: Any, wor
         AnyBundle(stages),
         AnyBundle(constants),
         AnyBundle(workspace),
+        AnyBundle(constants),
     )
 
 
@@ -142,7 +144,7 @@ def project_start(problem, s, entries, t):
     """Project the states s.y to their manifold at time t."""
     set_all(entries.time, t)
     copy(s.y, s.trial)
-    problem.project(problem.stages, problem.constants)
+    problem.project(problem.stages, problem.manifold)
     copy(s.trial, s.y)
 
 

@@ -2,7 +2,8 @@
 them.
 
 An integrator projects the state at the end of every step that it accepts. The problem that it is given here passes all
-that it is asked on to another one, and keeps what was projected. Times of samples within steps are kept, too.
+that it is asked on to another one, and keeps what was projected. Times of samples within steps are kept, too. Of runs
+in lanes only the fastest states are kept.
 """
 
 from __future__ import annotations
@@ -12,11 +13,13 @@ from typing import Any
 
 import numpy as np
 
+from flexmb.integrate.lane_problem import LaneEntries, LaneProblem, LaneStages
 from flexmb.integrate.problem import Problem, StiffProblem
 from flexmb.integrate.watch import Watch
 from flexmb.jit.bundle import AnyBundle, bundle
 from flexmb.jit.direct import nothing_at, real_at, status_at
 from flexmb.jit.kernel import helper, kernel
+from flexmb.jit.lanes import LANES
 from flexmb.jit.pointer import REAL, STATUS, VECTOR, VOID, WHOLE, pointer
 from flexmb.typing import Index, Real
 
@@ -28,21 +31,29 @@ ADDRESSES = 4
 
 @bundle
 class FastestStates:
-    """The states of a run, at ends of steps and at samples, in which the speeds `entry` (m,) of y are largest together.
+    """Of R runs, in each of K equal parts of their time, the state at the end of a step or at a sample in which the
+    speeds `entry` (m,) of y are largest together.
 
-    size (K,): their sums of absolute values, those of K states that were too slow to be kept at first; state (K,1+n): t
-    (s) and the first n numbers of y; least (1,): the place of the smallest.
+    size (R,K): sums of their absolute values, weighed, or `slow` where nothing was faster; state (R,K,1+n): t (s) and
+    the first n numbers of y; times (2,): the start (s) of the runs, and how many parts a second has.
     """
 
     entry: Index
-    slow: Real  # (1,) the sum of those that are too slow
+    weight: Real  # (m,)
+    slow: Real  # (R,) the sum of those that are too slow
     size: Real
     state: Real
-    least: Index
+    times: Real
 
-    def empty(self) -> None:
-        """Forget all states."""
-        self.size[:], self.state[:], self.least[0] = self.slow[0], np.nan, 0
+    def begin(self, times: Real) -> None:
+        """Forget all states, before a run over these times (s)."""
+        self.size[:], self.state[:] = self.slow[:, None], np.nan
+        self.times[:] = times[0], self.size.shape[1] / max(times[-1] - times[0], np.finfo(float).tiny)
+
+    def of_run(self, run: int) -> Real:
+        """The states (k,1+n) that are kept of a run."""
+        found = self.state[run]
+        return found[~np.isnan(found[:, 0])]
 
 
 @bundle
@@ -61,19 +72,29 @@ class RecordedSteps:
 
 
 @helper
+def _place_if_fast(t, total, f, run):
+    """The place for a state of a run whose speeds sum up to this; -1 if it is not the fastest of its part of time."""
+    if not total > f.slow[run]:
+        return -1
+    part = (t - f.times[0]) * f.times[1]
+    place = min(int(part), f.size.shape[1] - 1) if part > 0.0 else 0
+    if not total > f.size[run, place]:
+        return -1
+    f.size[run, place] = total
+    return place
+
+
+@helper
 def _keep_if_fast(t, y, f):
     """Keep a state in place of the slowest one that is kept, if it is faster."""
     total = 0.0
     for i in range(f.entry.shape[0]):
-        total += abs(y[f.entry[i]])
-    least = f.least[0]
-    if total > f.size[least]:
-        f.size[least], f.state[least, 0] = total, t
-        for i in range(1, f.state.shape[1]):
-            f.state[least, i] = y[i - 1]
-        for place in range(f.size.shape[0]):
-            if f.size[place] < f.size[f.least[0]]:
-                f.least[0] = place
+        total += f.weight[i] * abs(y[f.entry[i]])
+    place = _place_if_fast(t, total, f, 0)
+    if place >= 0:
+        f.state[0, place, 0] = t
+        for i in range(1, f.state.shape[2]):
+            f.state[0, place, i] = y[i - 1]
 
 
 @helper
@@ -154,15 +175,18 @@ def watching(record: RecordedSteps, watch: Watch) -> Watch:
     return watch.seeing(len(watch.signal), look, record)
 
 
-def fastest_states(entries: Sequence[int], slow: float, count: int, numbers: int) -> FastestStates:
-    """Room for so many states, of so many first numbers of y each, whose sum of these speeds exceeds `slow`."""
-    entry, states = np.array(entries, np.int64), np.full((count, 1 + numbers), np.nan)
-    return FastestStates(entry, np.array([slow]), np.full(count, slow), states, np.zeros(1, np.int64))
+def fastest_states(weights: Real, slow: Sequence[float], parts: int, numbers: int) -> FastestStates:
+    """Room for a state in each of so many parts of time, of so many first numbers of y, of one run for each sum of
+    speeds that is too slow; weights (numbers,): of these numbers, zero for those that are not watched."""
+    entry, size = np.flatnonzero(weights), (len(slow), parts)
+    return FastestStates(
+        entry, weights[entry], np.array(slow, float), np.zeros(size), np.zeros((*size, 1 + numbers)), np.zeros(2)
+    )
 
 
 def nothing_fast() -> FastestStates:
     """Of runs in which nobody looks at speeds."""
-    return fastest_states([], np.inf, 0, 0)
+    return fastest_states(np.zeros(0), [np.inf], 0, 0)
 
 
 def recorded(
@@ -192,3 +216,45 @@ def recorded(
             resolve=pointer(resolve, VOID, VECTOR, VECTOR, VECTOR, WHOLE, record),
         )
     return own, record
+
+
+@bundle
+class RecordedLanes:
+    """The fastest states of LANES runs at once."""
+
+    address: Index  # (3,) of the kernel that projects, the stages and the constants
+    entries: LaneEntries
+    fastest: FastestStates
+
+
+@kernel
+def lane_project(s, r):
+    """Project s.trial, and keep the states of those lanes that go on from them, or have a sample there."""
+    nothing_at(r.address[0], (r.address[1], r.address[2]))
+    f, entries = r.fastest, r.entries
+    total = 0.0
+    for i in range(f.entry.shape[0]):
+        total += f.weight[i] * abs(s.trial[f.entry[i]])
+    s.norm[2] = total  # nobody needs it beyond the first step
+    for lane in range(LANES):
+        if entries.chosen[0, lane] == 1.0:
+            place = _place_if_fast(entries.time[0, lane], entries.norm[2, lane], f, lane)
+            if place >= 0:
+                f.state[lane, place, 0] = entries.time[0, lane]
+                for i in range(1, f.state.shape[2]):
+                    f.state[lane, place, i] = entries.trial[i - 1, lane]
+
+
+def record_of_lanes(entries: LaneEntries, fastest: FastestStates) -> RecordedLanes:
+    """A record for one thread, of LANES runs after the other."""
+    return RecordedLanes(np.zeros(3, np.int64), entries, fastest)
+
+
+def recorded_lanes(posed: LaneProblem, stages: LaneStages, record: RecordedLanes, times: Real) -> LaneProblem:
+    """The same problem with a record of its fastest states, which begins anew with all lanes."""
+    tables = posed.stages.kernel_address, posed.manifold.kernel_address
+    record.address[:] = posed.project.__wrapper_address__(), *tables
+    record.fastest.begin(times)
+    record.entries.chosen[:] = 1.0
+    own = pointer(lane_project, VOID, stages, record)
+    return posed._replace(project=own, manifold=AnyBundle(record))

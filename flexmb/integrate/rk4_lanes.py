@@ -64,7 +64,7 @@ def rk4_lanes(problem, s, entries, clock, accuracy, out, counts):
                     return NONFINITE, t
                 t = end if j == steps - 1 else start + (j + 1) * h
                 set_all(entries.time, t)
-                problem.project(problem.stages, problem.constants)
+                problem.project(problem.stages, problem.manifold)
                 copy(s.trial, s.y)
                 for lane in range(LANES):
                     counts[lane, ACCEPTED] += 1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from copy import copy as fresh_copy
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -15,23 +15,36 @@ from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.lane_control import LaneControl, lane_control
 from flexmb.integrate.lane_problem import first_derivative, lane_problem
 from flexmb.integrate.problem import Accuracy, Clock
+from flexmb.integrate.recorded import (
+    FastestStates,
+    RecordedLanes,
+    RecordedSteps,
+    record_of_lanes,
+    recorded,
+    recorded_lanes,
+)
 from flexmb.integrate.rk4_lanes import rk4_lanes
 from flexmb.integrate.settings import Settings
 from flexmb.integrate.watch import nothing_watched
 from flexmb.jit.lanes import LANES
 from flexmb.run.origin import Beginning
-from flexmb.run.propagate import Integration, recursion
+from flexmb.run.propagate import NO_STATES, Integration, recursion, states_to_keep, watched_turns
 from flexmb.run.switching import segment_ends
 from flexmb.system import algorithms
 from flexmb.system.batch import Batch, LaneTables, in_threads
 from flexmb.system.system import System
+from flexmb.tables.arrays import Constants
 from flexmb.tables.state import DynamicsError
 from flexmb.tables.status import INTERRUPTED, MAX_STEPS, NONFINITE, NOT_POSITIVE_DEFINITE, OK
 from flexmb.typing import Index, Real
 
+if TYPE_CHECKING:
+    from flexmb.system.level_range import TooFast
+
 _IN_LANES = ("rk4", "dop853")
 _DECIDED = (OK, MAX_STEPS, INTERRUPTED)  # statuses of lanes that are final; other copies are run again one by one
 _NOT_YET = -1
+_Each = TypeVar("_Each")
 
 
 class Runs(NamedTuple):
@@ -58,10 +71,15 @@ def runs(q: Real, u: Real, samples: int) -> Runs:
 
 
 class BatchRun:
-    """Runs of the copies of a batch by one method."""
+    """Runs of the copies of a batch by one method.
+
+    turned: by copy that has reached its end, which bodies turned too fast for their level at any step.
+    """
 
     def __init__(self, batch: Batch, times: Real, settings: Settings, found: Runs) -> None:
         self._batch, self._times, self._settings, self._found = batch, times, settings, found
+        self.turned: dict[int, list[TooFast]] = {}
+        self._turns = [watched_turns(system) for system in batch.systems]
         fixed = settings.integrator.fixed
         self._ends = [segment_ends(system, times[0], times[-1], fixed) for system in batch.systems]
 
@@ -72,8 +90,15 @@ class BatchRun:
         blocks = list(range(0, n, LANES)) if in_lanes else []
         if blocks:
             in_threads(self._in_lanes, blocks, threads)
+            self.turned = {copy: found for copy, found in self.turned.items() if copy < n}  # the last one fills a block
         left = [copy for copy in range(n) if self._found.status[copy] == _NOT_YET]
         in_threads(self._alone, left, threads if self._batch.in_lanes and not controlled else 1)
+
+    @staticmethod
+    def _block_of(of_systems: Sequence[_Each], first: int) -> list[_Each]:
+        """What belongs to the systems of a block of copies."""
+        last = len(of_systems) - 1
+        return [of_systems[min(first + lane, last)] for lane in range(LANES)]
 
     def _copies_ends(self, copies: Sequence[int]) -> list[Real]:
         """Segment ends (s) of each of these copies."""
@@ -82,17 +107,28 @@ class BatchRun:
 
     def _in_lanes(self, firsts: Iterable[int]) -> None:
         with self._batch.tables() as tables:
+            watched = [each for each in self._turns if each is not None]
+            record = None
+            if watched:  # a larger weight keeps more states than are needed
+                heaviest = np.max([each.weights for each in watched], axis=0)
+                fastest = states_to_keep(self._batch.systems[0], watched[0]._replace(weights=heaviest), LANES)
+                record = record_of_lanes(tables.entries, fastest)
             for first in firsts:
-                self._block(first, tables)
+                self._block(first, tables, record)
 
-    def _block(self, first: int, tables: LaneTables) -> None:
+    def _block(self, first: int, tables: LaneTables, record: RecordedLanes | None) -> None:
         """Run LANES copies at once; those that end with a status that is not in _DECIDED are left for single runs."""
         w, s, entries, _ = tables
         place = slice(first, first + LANES)
         found = Runs(*(part[place] for part in self._found))
         ends = self._copies_ends(range(first, first + LANES))
         s.y[...] = found.y.T
-        problem = lane_problem(lanes.rhs, lanes.project, s, self._batch.constants(first // LANES, w), w)
+        constants = self._batch.constants(first // LANES, w)
+        problem = lane_problem(lanes.rhs, lanes.project, s, constants, w)
+        if record is not None:
+            turns = self._block_of(self._turns, first)
+            record.fastest.slow[:] = [np.inf if each is None else each.slow for each in turns]
+            problem = recorded_lanes(problem, s, record, self._times)
         if first_derivative(problem, s, entries, self._times[0], found.counts) != OK or w.doubt[0]:
             self._examine(first, found.status)
         accuracy = self._settings.accuracy(self._batch.nq, self._batch.nu)
@@ -113,6 +149,29 @@ class BatchRun:
             stopped_at = np.full(LANES, t)
         for lane in np.flatnonzero((found.status == _NOT_YET) & np.isin(status, _DECIDED)):
             found.status[lane], found.stopped_at[lane] = status[lane], stopped_at[lane]
+        if record is not None and not np.isnan(record.fastest.state[:, :, 0]).all():
+            self._look_at_turns(first, tables, constants, record.fastest)
+
+    def _look_at_turns(self, first: int, tables: LaneTables, constants: Constants, fastest: FastestStates) -> None:
+        """Which bodies of LANES copies turned too fast, by the velocities that a right-hand side leaves."""
+        from flexmb.system.level_range import of_runs  # imported here as many scenes have no flexible bodies
+
+        w, s, entries, _ = tables
+        size = np.where(np.isnan(fastest.state[:, :, 0]), 0.0, fastest.size)
+        size[self._found.status[first : first + LANES] != OK] = 0.0
+        order = np.argsort(-size, axis=1, kind="stable")
+        states = np.take_along_axis(fastest.state, order[:, :, None], axis=1)
+        t = np.where(np.isnan(states[:, :, 0]), self._times[0], states[:, :, 0])
+
+        def turns(n: int) -> Real:
+            entries.time[0], entries.trial[:-1], s.stage[0] = t[:, n], states[:, n, 1:].T, 0
+            lanes.rhs(s, constants, w)
+            return np.moveaxis(w.body["velocity"][:, :3], -1, 0)
+
+        systems = self._block_of(self._batch.systems, first)
+        for lane, found in enumerate(of_runs(systems, t, np.take_along_axis(size, order, axis=1), turns)):
+            if found:
+                self.turned[first + lane] = found
 
     def _examine(self, first: int, status: Index) -> None:
         """Set the status of copies that cannot run, because an inertia is not positive definite at the start."""
@@ -142,6 +201,16 @@ class BatchRun:
             clock, out, counts = Clock(self._times, ends), found.out[copy], found.counts[copy]
             status, t = solve(found.y[copy].copy(), clock, accuracy, out, counts)
             found.status[copy], found.stopped_at[copy], found.fault[copy] = status, t, solve.fault
+            if status == OK and len(solve.fastest) and (turned := _too_fast(system, solve.fastest)):
+                self.turned[copy] = turned
+
+
+def _too_fast(system: System, states: Real) -> list[TooFast]:
+    """By the fastest states (K,1+nq+nu) of a run."""
+    from flexmb.system.level_range import too_fast  # imported here as many scenes have no flexible bodies
+
+    t, q, u = states[:, 0], states[:, 1 : 1 + system.nq], states[:, 1 + system.nq :]
+    return list(too_fast(system, t, u, lambda n: system.turns(float(t[n]), q[n], u[n])))
 
 
 class Alone:
@@ -156,11 +225,16 @@ class Alone:
         else:  # all modes are eliminated explicitly, as in lanes, so that both give the same results
             self._workspace = system.workspace()
             self._problem = recursion(system.constants, self._workspace)
+            self._record: RecordedSteps | None = None
+            if (turns := watched_turns(system)) is not None:
+                self._problem, self._record = recorded(self._problem, 0, states_to_keep(system, turns))
 
     def __call__(self, y: Real, clock: Clock, accuracy: Accuracy, out: Real, counts: Index) -> tuple[int, float]:
         """See `Integrator`; out (T,nq+nu+1) does not contain the states of controllers."""
         whole, memory, watch = self._whole, self._method.memory, nothing_watched()
         if whole is None:
+            if self._record is not None:
+                self._record.fastest.begin(clock.times)
             return self._method.run(self._problem, y, clock, accuracy, out, counts, memory(len(y)), watch)
         if whole.feedback is None:
             return whole(y, clock, accuracy, out, counts, memory(len(y)), watch)
@@ -171,6 +245,13 @@ class Alone:
         whole.ended(None)
         out[:, :-1], out[:, -1] = found[:, : out.shape[1] - 1], found[:, -1]
         return status, t
+
+    @property
+    def fastest(self) -> Real:
+        """States of the last run: see `flexmb.run.propagate.Raw`."""
+        if self._whole is not None:
+            return self._whole.fastest
+        return NO_STATES if self._record is None else self._record.fastest.of_run(0)
 
     @property
     def fault(self) -> int:

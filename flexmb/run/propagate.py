@@ -15,7 +15,7 @@ from flexmb.integrate.control import COUNTS, SAMPLES, STOP
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.memory import Memory, memory
 from flexmb.integrate.problem import Accuracy, Clock, Linear, Problem, problem, stiff_problem
-from flexmb.integrate.recorded import RecordedSteps, fastest_states, recorded, watching
+from flexmb.integrate.recorded import FastestStates, RecordedSteps, fastest_states, recorded, watching
 from flexmb.integrate.settings import Settings
 from flexmb.integrate.watch import CROSSED, Watch, nothing_watched
 from flexmb.motion import coordinates
@@ -35,9 +35,10 @@ from flexmb.typing import Index, Real
 if TYPE_CHECKING:
     from flexmb.control.feedback import Feedback
     from flexmb.control.memory import LoopMemory
+    from flexmb.system.level_range import TurnsToWatch
 
 
-_NONE: Real = np.zeros((0, 0))
+NO_STATES: Real = np.zeros((0, 0))
 
 
 class Raw(NamedTuple):
@@ -60,12 +61,27 @@ class Raw(NamedTuple):
     memory: Memory | None
     paused: bool = False
     controllers: LoopMemory | None = None
-    fastest: Real = _NONE
+    fastest: Real = NO_STATES
 
 
 def recursion(constants: Constants, workspace: Any) -> Problem:
     """The equations of motion by the O(N) recursion."""
     return problem(articulated.rhs, coordinates.project, constants, workspace)
+
+
+def watched_turns(system: System) -> TurnsToWatch | None:
+    """Which states of a run are kept for the watch of levels; None where no body can turn too fast for its level."""
+    if all(link.is_rigid for link in system.links):
+        return None
+    from flexmb.system.level_range import turns_to_watch  # imported here as many scenes have no flexible bodies
+
+    return turns_to_watch(system)
+
+
+def states_to_keep(system: System, turns: TurnsToWatch, runs: int = 1) -> FastestStates:
+    """Room for the fastest states of runs of a system."""
+    weights = np.concatenate([np.zeros(system.nq), turns.weights])
+    return fastest_states(weights, [turns.slow] * runs, turns.parts, system.nq + system.nu)
 
 
 class Integration:
@@ -101,11 +117,7 @@ class Integration:
             moving = route.rhs, constants, self._workspace
             self.batch = batch(system, moving, algorithm.observing, system.nq + system.nu + 1)
         self._enter: Any = None  # the compiled integrator
-        self._turns: tuple[list[int], float, int] | None = None
-        if not system.is_rigid:
-            from flexmb.system.level_range import turns_to_watch  # imported here as many scenes have no flexible bodies
-
-            self._turns = turns_to_watch(system)
+        self._turns = watched_turns(system)
         self._posed, self._record = self._recording()
         self._at_first = [(array, array.copy()) for array in route.remembered(constants)]
 
@@ -118,6 +130,8 @@ class Integration:
     def __call__(self, *given: Any) -> tuple[int, float]:
         """Integrate: (y, clock, accuracy, out, counts, memory, watch) of `Integrator`, all arrays in C order."""
         self.compile(*given)
+        if self._record is not None:
+            self._record.fastest.begin(given[1].times)
         return self._enter(self._posed, *given)
 
     def watching(self, watch: Watch) -> Watch:
@@ -130,15 +144,14 @@ class Integration:
         """The problem; if bodies may turn too fast for their levels it keeps its fastest states."""
         if self._turns is None:
             return self._problem, None
-        return recorded(self._problem, 0, fastest_states(*self._turns, self.system.nq + self.system.nu))
+        return recorded(self._problem, 0, states_to_keep(self.system, self._turns))
 
     @property
     def fastest(self) -> Real:
-        """Of what was integrated since the last `begin`: see `Raw`."""
+        """Of what was integrated last: see `Raw`."""
         if self._record is None:
-            return _NONE
-        found = self._record.fastest.state
-        return found[~np.isnan(found[:, 0])].copy()
+            return NO_STATES
+        return self._record.fastest.of_run(0)
 
     def forget(self) -> None:
         """Restore the initial state: closed chains store the branch that they are on."""
@@ -153,8 +166,6 @@ class Integration:
     def begin(self, begin: Beginning, clock: Clock, accuracy: Accuracy, counts: Index) -> tuple[Real, Clock, Accuracy]:
         """State, clock and accuracy of a run; for a scene with controllers, those of the closed loop."""
         if self.feedback is None:
-            if self._record is not None:
-                self._record.fastest.empty()
             return begin.y, clock, accuracy
         self._problem, y, clock, accuracy = self.feedback.begin(begin, clock, accuracy, self._linear)
         self._posed, self._record = self._recording()

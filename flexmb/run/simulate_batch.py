@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Sequence
-from functools import partial
+from collections.abc import Iterator, Mapping, Sequence
 from time import perf_counter
-from typing import Any, Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
@@ -33,6 +32,12 @@ from flexmb.tables.features import BATCHES
 from flexmb.tables.status import OK
 from flexmb.typing import Real
 
+if TYPE_CHECKING:
+    from flexmb.system.level_range import TooFast
+
+NAMED = 8
+"""Ranges of copies that a warning names."""
+
 
 def simulate_batch(
     copies: Batch | System | Sequence[Scene],
@@ -56,8 +61,8 @@ def simulate_batch(
 
     A run that fails raises nothing and does not affect the others: `status` and `message` of the result say why it
     stopped. Raises SceneError, ValueError, TypeError or NotImplementedError as `simulate` does, ValueError for states
-    that do not fit the copies, and KeyboardInterrupt for Ctrl-C. Warns (`SceneWarning`) as `simulate` does, of many
-    copies once.
+    that do not fit the copies, and KeyboardInterrupt for Ctrl-C. Warns (`SceneWarning`) of what `simulate` warns of
+    in any copy, once for all copies, with their numbers.
     """
     refuse_unknown("simulate_batch", settings)
     batch = copies.batch if isinstance(copies, System) else copies
@@ -75,41 +80,65 @@ def simulate_batch(
     number = number_of_threads(threads, -(-len(rows[0]) // LANES))
     _refuse_too_many(len(rows[0]), len(times), batch)
     found = runs(*rows, len(times))
+    turned: dict[int, list[TooFast]] = {}
     if len(rows[0]):
         start, stop = perf_counter(), found.counts.T[STOP : STOP + 1]  # stops all runs at once
-        _, interrupted = interruptible(BatchRun(batch, times, chosen, found), (len(rows[0]), number), stop)
+        runner = BatchRun(batch, times, chosen, found)
+        _, interrupted = interruptible(runner, (len(rows[0]), number), stop)
         if interrupted:
             raise KeyboardInterrupt
+        turned = runner.turned
         if batch.in_lanes and not chosen.integrator.linearises and not batch.system(0).scene.controllers:
             computed(batch.system(0), perf_counter() - start, BATCHES)
     made = _gathered(batch, times, found, len(rows[0]))
-    for warning in _watched(made):
+    for warning in _watched(made, turned):
         warnings.warn(warning, SceneWarning, stacklevel=2)
     return made
 
 
-def _watched(runs: BatchTrajectory) -> Iterator[str]:
-    """What watches of accuracy say of the finished copies: of each body and each watch once, of the worst copy."""
-    batch, done = runs.batch, np.flatnonzero(runs.status == OK)
-    if not len(done) or all(link.is_rigid for link in batch.systems[0].links):
-        return
-    together = [done] if batch.shares_constants else [done[i : i + 1] for i in range(len(done))]
-    found: dict[tuple[str, str], list[tuple[Said, int]]] = {}
-    for copies in together:
-        system = batch.system(int(copies[0]))
-        t = np.tile(runs.t, len(copies))
-        q, u = (each[copies].reshape(len(t), -1) for each in (runs.q, runs.u))
-        turns = partial(_turns, system, t, q, u)
-        for each in said(WatchedStates(system, t, q, u, turns)):
-            found.setdefault((each.waiver, each.finding.body), []).append((each, int(copies[0])))
+def _watched(runs: BatchTrajectory, turned: Mapping[int, Sequence[TooFast]]) -> Iterator[str]:
+    """What watches of accuracy say: of each body and each watch once, of the worst copy, with the numbers of all.
+
+    turned: by copy that has reached its end, which bodies turned too fast for their level. Strains of level exact are
+    looked at as in single runs, at the output times.
+    """
+    batch, found = runs.batch, dict[tuple[str, str], dict[int, Said]]()
+    strained = len(batch.systems[0].constants.section) > 0
+    failed = set(runs.failed.tolist())
+    for copy in range(len(runs.status)) if strained else sorted(turned.keys() | failed):
+        if strained or copy in failed:
+            own = said(_seen(runs, copy, turned.get(copy, ())))
+        else:
+            own = [Said(each, "level_range") for each in turned[copy]]
+        for each in own:
+            found.setdefault((each.waiver, each.finding.body), {})[copy] = each
     for alike in found.values():
-        worst, copy = max(alike, key=lambda each: each[0].finding.size)
-        more = f" (copy {copy}, the worst of {len(alike)} copies like it)" if len(alike) > 1 else ""
-        yield f'scene "{batch.systems[0].scene.name}": {worst}{more}'
+        worst = max(alike, key=lambda copy: alike[copy].finding.size)
+        yield f'scene "{batch.systems[0].scene.name}": {alike[worst]}{_called(sorted(alike), worst)}'
 
 
-def _turns(system: System, t: Real, q: Real, u: Real, n: int) -> Real:
-    return system.turns(float(t[n]), q[n], u[n])
+def _seen(runs: BatchTrajectory, copy: int, turned: Sequence[TooFast]) -> WatchedStates:
+    """A copy as watches of accuracy see it; one that has failed by its output times."""
+    system, failed = runs.batch.system(copy), bool(runs.status[copy] != OK)
+    reached = np.isfinite(runs.q[copy]).all(axis=1)
+    t, q, u = runs.t[reached], runs.q[copy, reached], runs.u[copy, reached]
+
+    def turns(n: int) -> Real:
+        return system.turns(float(t[n]), q[n], u[n])
+
+    return WatchedStates(system, t, q, u, turns, failed, turned=None if failed else turned)
+
+
+def _called(copies: list[int], worst: int) -> str:
+    """The numbers of copies, which ascend, as words: not more than NAMED ranges of them."""
+    if len(copies) == 1:
+        return f" (copy {worst})"
+    steps = np.flatnonzero(np.diff(copies) > 1)
+    ranges = [(int(each[0]), int(each[-1])) for each in np.split(copies, steps + 1)]
+    words = [str(i) if i == j else f"{i} to {j}" for i, j in ranges[:NAMED]]
+    left = sum(j - i + 1 for i, j in ranges[NAMED:])
+    more = f" and {left} more" if left else ""
+    return f" (copies {', '.join(words)}{more}; copy {worst} is the worst)"
 
 
 def _given(batch: Batch, q: Any, u: Any) -> tuple[Any, Any]:

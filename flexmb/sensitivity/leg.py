@@ -125,7 +125,7 @@ class Variation:
         return rates + self._energy_by_time(t, at.y) * dt if np.any(dt) else rates
 
     def _energy_by_time(self, t: float, y: Real) -> Real:
-        """The explicit derivative () of the energy by time: what is prescribed moves on, whatever its entries in y are."""
+        """The explicit derivative () of the energy by time: what is prescribed moves on, whatever its entries in y."""
         system = self.blocks.system
         c, observation, chain = system.constants, system.observation, system.closures
         if not np.any(c.speed["prescribed"] >= 0):

@@ -8,15 +8,17 @@ shapes leave out the pull, or both: their lowest frequency omega_1 is off by 0.6
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from flexmb.building.links import BodyLink
+from flexmb.hinges.catalogue import KINDS
 from flexmb.modal.integrals import modal_integrals
 from flexmb.scene.bodies import BeamBody
 from flexmb.system.system import System
+from flexmb.tables.arrays import ANGULAR_Z
 from flexmb.typing import Flags, Real
 
 UNPULLED = ("ruthless", "linear", "full")
@@ -25,6 +27,8 @@ ALLOWED = 0.2
 """(w / omega_1)^2 up to which nothing is said: there the lowest frequency is off by 11 %."""
 LOOKED_AT = 32
 """States of a run that are looked at: those with the fastest turns of hinges."""
+ROUNDING = 1e-6
+"""What faster turns must be faster by to be looked at."""
 
 
 class TooFast(NamedTuple):
@@ -57,28 +61,72 @@ def too_fast(system: System, t: Real, u: Real, turns: Callable[[int], Real]) -> 
 
     turns: angular velocities (N,3) rad/s of the bodies in a state, by its number, as `System.turns`.
     """
-    firsts = _firsts(system)
-    if not firsts:
-        return
-    fastest = {k: (0.0, 0) for k in firsts}
-    for n in _suspects(system, u, _slow(firsts)):
+    if _firsts(system):
+        size = np.abs(u) @ _weights(system)
+        order = np.argsort(-size, kind="stable")[:LOOKED_AT]
+        yield from of_runs([system], t[None, order], size[None, order], lambda n: turns(int(order[n]))[None])[0]
+
+
+def of_runs(systems: Sequence[System], t: Real, size: Real, turns: Callable[[int], Real]) -> list[list[TooFast]]:
+    """The same of R runs of one structure each, from states at t (R,K) s, in descending order of `size` (R,K): what no
+    body's turn exceeds in parts of its lowest frequency, see `turns_to_watch`.
+
+    turns: angular velocities (R,N,3) rad/s of the bodies in the n-th state of each run.
+    """
+    watched = sorted({k for system in systems for k in _firsts(system)})
+    firsts = np.array([[_firsts(system).get(k, np.inf) for k in watched] for system in systems])
+    fastest, at = np.zeros(firsts.shape), np.zeros(firsts.shape, np.int64)
+    for n in range(size.shape[1]):
+        if not np.any(size[:, n, None] > (1.0 + ROUNDING) * np.maximum(fastest, np.sqrt(ALLOWED))):
+            break
         w = turns(n)
-        for k in firsts:
-            rate = _across(system.links[k], w[k])
-            fastest[k] = max(fastest[k], (rate, n))
-    for k, (rate, n) in fastest.items():
-        if rate**2 > ALLOWED * firsts[k] ** 2:
-            link = system.links[k]
-            yield TooFast(link.name, link.level.name, float(t[n]), rate, firsts[k], _remedy(link))
+        rate = np.column_stack([_across(systems, k, w[:, k]) for k in watched]) / firsts
+        faster = rate > fastest
+        fastest[faster], at[faster] = rate[faster], n
+    found: list[list[TooFast]] = [[] for _ in systems]
+    for run, j in zip(*np.nonzero(fastest > np.sqrt(ALLOWED)), strict=True):
+        link, when, first = systems[run].links[watched[j]], float(t[run, at[run, j]]), float(firsts[run, j])
+        rate_of = float(fastest[run, j]) * first
+        found[run].append(TooFast(link.name, link.level.name, when, rate_of, first, _remedy(link)))
+    return found
 
 
-def turns_to_watch(system: System) -> tuple[list[int], float, int] | None:
-    """The entries of y = [q, u, ...] that are speeds of hinges, the sum of their sizes (rad/s) up to which no body
-    turns too fast for its level, and how many states are looked at; None where no body can, or the scene waives it."""
-    firsts = {} if "level_range" in system.scene.allow else _firsts(system)
-    if not firsts:
+class TurnsToWatch(NamedTuple):
+    """Weights (nu,) of the sizes of speeds in a sum that no body's turn exceeds in parts of its lowest frequency, but
+    by what modes turn; up to where nothing is said of that sum; and in how many parts of its time the state of a run
+    in which it is largest is looked at."""
+
+    weights: Real
+    slow: float
+    parts: int
+
+
+def turns_to_watch(system: System) -> TurnsToWatch | None:
+    """None where no body can turn too fast, or the scene waives it."""
+    if "level_range" in system.scene.allow or not _firsts(system) or not _weights(system).any():
         return None
-    return (system.nq + np.flatnonzero(of_hinges(system))).tolist(), _slow(firsts), LOOKED_AT
+    return TurnsToWatch(_weights(system), float(np.sqrt(ALLOWED)), LOOKED_AT)
+
+
+def _weights(system: System) -> Real:
+    """See `TurnsToWatch`: the largest over the bodies that a speed turns; kept.
+
+    A single axis of a body's own hinge counts by its part across the body, so that shafts may turn as they like.
+    """
+    weights: Real | None = system.kept.get("level_range weights")
+    if weights is None:
+        weights, body = np.zeros(system.nu), system.constants.body
+        for k, first in _firsts(system).items():
+            at = k
+            while at >= 0:
+                place, kind = int(body["u_index"][at]), KINDS[body["hinge_kind"][at]]
+                is_own_axis = at == k and body["axis"][at] == ANGULAR_Z
+                part = float(_across([system], k, np.eye(3)[2:])[0]) if is_own_axis else 1.0
+                for n in set(range(body["nv"][at])) - set(kind.displacements):
+                    weights[place + n] = max(weights[place + n], part / first)
+                at = int(body["parent"][at])
+        weights = system.kept.setdefault("level_range weights", weights)
+    return weights
 
 
 def _firsts(system: System) -> dict[int, float]:
@@ -88,11 +136,6 @@ def _firsts(system: System) -> dict[int, float]:
         found = {k: _first(link) for k, link in enumerate(system.links)}
         firsts = system.kept.setdefault("level_range", {k: first for k, first in found.items() if first > 0.0})
     return firsts
-
-
-def _slow(firsts: dict[int, float]) -> float:
-    """The speed (rad/s) up to which nothing is said of any body."""
-    return float(np.sqrt(ALLOWED)) * min(firsts.values())
 
 
 def of_hinges(system: System) -> Flags:
@@ -107,16 +150,6 @@ def _remedy(link: BodyLink) -> str:
     if isinstance(link.body, BeamBody):
         return 'take level "stiffened" or "exact"'
     return 'take level "stiffened", which needs a second-order field or geometric stiffness'
-
-
-def _suspects(system: System, u: Real, slow: float) -> list[int]:
-    """The numbers of the states with the largest speeds of hinges.
-
-    Where all speeds together are below `slow` (rad/s), nothing turns faster.
-    """
-    size = np.abs(u[:, of_hinges(system)]).sum(axis=1)
-    order = np.argsort(-size, kind="stable")[:LOOKED_AT]
-    return [int(n) for n in order if size[n] > slow]
 
 
 def _first(link: BodyLink) -> float:
@@ -134,10 +167,19 @@ def _first(link: BodyLink) -> float:
     return float(np.sqrt(max(chosen.min(initial=np.inf), 0.0))) if len(chosen) else 0.0
 
 
-def _across(link: BodyLink, w: Real) -> float:
-    """The part of the angular velocity w (3,) rad/s that pulls at the points of a body along their distances."""
-    r = link.model.position - link.model.nodes["origin"].position
-    far = float(np.max(np.linalg.norm(r, axis=1), initial=0.0))
-    return float(np.max(np.linalg.norm(np.cross(w, r), axis=1), initial=0.0)) / far if far > 0.0 else 0.0
+def _across(systems: Sequence[System], k: int, w: Real) -> Real:
+    """The part (R,) of a body's angular velocities w (R,3) rad/s that pulls at its points along their distances."""
+    arms = [_arms(system, k) for system in systems]
+    r = np.array(arms) if len({id(each) for each in arms}) > 1 else arms[0][None]
+    return np.max(np.linalg.norm(np.cross(w[:, None], r), axis=2), axis=1, initial=0.0)
 
 
+def _arms(system: System, k: int) -> Real:
+    """Vectors (P,3) from the origin of a body to its points, in parts of the largest distance; kept."""
+    arms: dict[int, Real] = system.kept.setdefault("level_range arms", {})
+    if k not in arms:
+        model = system.links[k].model
+        r = model.position - model.nodes["origin"].position
+        far = float(np.max(np.linalg.norm(r, axis=1), initial=0.0))
+        arms[k] = r / far if far > 0.0 else np.zeros((0, 3))
+    return arms[k]

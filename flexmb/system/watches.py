@@ -28,7 +28,8 @@ class WatchedStates(NamedTuple):
 
     turns: angular velocities (N,3) rad/s of the bodies in a state, by its number. failed: whether a run ended early,
     which may have diverged. loads: those (T,6) of hinges and closures, by name, None where they were not asked for.
-    fastest: further states of a run, at ends of its steps, see `flexmb.run.propagate.Raw`.
+    fastest: further states of a run, at ends of its steps, see `flexmb.run.propagate.Raw`. turned: what the watch of
+    levels says, if it has looked at every step while a batch ran.
     """
 
     system: System
@@ -39,6 +40,7 @@ class WatchedStates(NamedTuple):
     failed: bool = False
     loads: Mapping[str, Real] | None = None
     fastest: Real = _NONE
+    turned: Sequence[AccuracyFinding] | None = None
 
 
 class AccuracyFinding(Protocol):
@@ -74,6 +76,8 @@ class Said(NamedTuple):
 
 
 def _level_range(seen: WatchedStates) -> Iterator[AccuracyFinding]:
+    if seen.turned is not None:
+        return iter(seen.turned)
     from flexmb.system.level_range import too_fast  # imported here because many scenes have no flexible bodies
 
     system, T, more = seen.system, len(seen.t), seen.fastest

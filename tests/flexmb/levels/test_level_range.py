@@ -1,5 +1,6 @@
 """Whatever turns a flexible body faster than its level describes says so, with the level to take."""
 
+import re
 import warnings
 from functools import partial
 from typing import get_args
@@ -13,6 +14,7 @@ import flexmb as fm
 from flexmb.cli import app
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.ready import scenes
+from flexmb.run import lane_runs
 from flexmb.scene.bodies import Level, Modes
 from flexmb.scene.files import save_scene
 from flexmb.scene.shapes import beam_section
@@ -135,9 +137,69 @@ def test_batches_warn_once_and_of_the_worst():
         with pytest.warns(fm.SceneWarning, match='"arm": .*, 0.7 of its first frequency') as caught:
             fm.simulate_batch(copies, 0.02, samples=3, **given)
         assert len(caught) == 1
-        assert "u" in given or "(copy 2, the worst of 2 copies like it)" in str(caught[0].message)
+        assert "(copies 1 to 2; copy 2 is the worst)" in str(caught[0].message)
     fm.simulate_batch([arm(0.6 * FIRST, "stiffened")] * 2, 0.02, samples=3)
     fm.simulate_batch([replace(arm(0.6 * FIRST), allow=("level_range",))] * 2, 0.02, samples=3)
+
+
+def warned(call, *given, **settings):
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        call(*given, **settings)
+    return [str(each.message) for each in caught]
+
+
+def of_single_runs(scenes, t_end, method, u=None, **given):
+    """What the runs of all copies say, by the number of the copy."""
+    found = {}
+    for i, scene in enumerate(scenes):
+        state = {} if u is None else {"state": fm.compile(scene).state(fm.compile(scene).initial_state.q, u[i])}
+        if words := warned(fm.simulate, scene, t_end, method, **given, **state):
+            (found[i],) = words
+    return found
+
+
+@pytest.mark.parametrize("method", ["rk4", "dop853", "radau5"])
+@pytest.mark.parametrize("apart", [True, False])
+def test_batches_warn_of_what_single_runs_warn(method, apart, monkeypatch):
+    """The same words, of the same copies, also of turns between output times: in lanes, in the block that is not full,
+    of scenes and of states, and of methods without lanes."""
+    ends = (1.0, 0.2, 0.9, 0.3, 0.1, 1.05, 0.95, 0.4, 0.5, 1.1)
+    scenes = [turned(end).scene() for end in ends] if apart else [arm(0.0, level="linear")] * len(ends)
+    u = None if apart else np.outer(ends, fm.compile(arm(0.6 * FIRST, "linear")).initial_state.u)
+    given = {"samples": 2, "step": STEPS.get(method), "rtol": 1e-6, "atol": 1e-8}
+    alone = of_single_runs(scenes, TURN_S, method, u, **given)
+    copies, own = (scenes, {}) if apart else (fm.compile(scenes[0]), {"u": u})
+    assert 0 < len(alone) < len(ends)
+    (word,) = warned(fm.simulate_batch, copies, TURN_S, method, **given, **own)
+    said_of, named = word[:-1].split(" (copies ")
+    numbers = [range(int(each[0]), int(each[-1]) + 1) for each in
+               (part.split(" to ") for part in named.split("; ")[0].split(", "))]  # fmt: skip
+    assert [i for each in numbers for i in each] == list(alone)
+    worst = int(named.split("; copy ")[1].split()[0])
+    assert worst == 9 and facts(said_of) == pytest.approx(facts(alone[worst]), rel=1e-3)
+    if apart:  # negative control: by the output times alone nothing is seen
+        monkeypatch.setattr(lane_runs.BatchRun, "_look_at_turns", lambda *_: None)
+        monkeypatch.setattr(lane_runs.Alone, "fastest", np.zeros((0, 0)))
+        assert warned(fm.simulate_batch, copies, TURN_S, method, **given) == []
+
+
+def facts(word: str) -> list[float]:
+    """Rate, time and shares of a warning."""
+    return [float(each) for each in re.findall(r"(?<=[ =])[0-9][0-9.e+-]*(?=[ ;])", word)]
+
+
+def test_copies_that_waive_the_watch_or_fail_are_not_named():
+    scenes = [arm(0.6 * FIRST), replace(arm(0.8 * FIRST), allow=("level_range",)), arm(0.7 * FIRST)]
+    (word,) = warned(fm.simulate_batch, scenes, 0.02, samples=3)
+    assert "(copies 0, 2; copy 2 is the worst)" in word
+    states = np.array([fm.compile(scenes[0]).initial_state.u] * 3)
+    states[1] = np.nan
+    (word,) = warned(fm.simulate_batch, fm.compile(scenes[0]), 0.02, samples=3, u=states)
+    assert "(copies 0, 2; copy 0 is the worst)" in word
+    many = [arm((0.6 if i % 2 else 0.1) * FIRST) for i in range(24)]
+    (word,) = warned(fm.simulate_batch, many, 0.01, samples=2)
+    assert "(copies 1, 3, 5, 7, 9, 11, 13, 15 and 4 more; copy 1 is the worst)" in word
 
 
 def test_the_check_knows_rates_at_the_start_and_prescribed_ones(tmp_path):
