@@ -8,7 +8,6 @@ in lanes only the fastest states are kept.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -20,39 +19,40 @@ from flexmb.jit.bundle import AnyBundle, bundle
 from flexmb.jit.direct import nothing_at, real_at, status_at
 from flexmb.jit.kernel import helper, kernel
 from flexmb.jit.lanes import LANES
-from flexmb.jit.pointer import REAL, STATUS, VECTOR, VOID, WHOLE, pointer
+from flexmb.jit.pointer import REAL, STATUS, VECTOR, VOID, WHOLE, Pointer, pointer
 from flexmb.typing import Index, Real
 
 # Indices in `RecordedSteps.address` and, the first four, in that of `flexmb.sensitivity.adjoint.stages.Stages`.
 RHS, PROJECT, CONSTANTS, WORKSPACE, BACK, LEAP, MOVE, RESOLVE, LOOK = range(9)
+_SHORTEST = 1e-300  # s: a run of no length has one state
 ADDRESSES = 4
 """How many of them a problem without leaps, and without Jacobian, has."""
 
 
 @bundle
 class FastestStates:
-    """Of R runs, in each of K equal parts of their time, the state at the end of a step or at a sample in which the
-    speeds `entry` (m,) of y are largest together.
+    """Of R runs, in each of K equal parts of their time, the states at the end of a step or at a sample in which G sums
+    of the absolute values of the entries `entry` (m,) of y are largest.
 
-    size (R,K): sums of their absolute values, weighed, or `slow` where nothing was faster; state (R,K,1+n): t (s) and
-    the first n numbers of y; times (2,): the start (s) of the runs, and how many parts a second has.
+    size (R,G,K): these sums, or `slow` where none was larger; state (R,G,K,1+n): t (s) and the first n numbers of y;
+    times (2,): the start (s) of the runs, and how many parts a second has.
     """
 
     entry: Index
-    weight: Real  # (m,)
-    slow: Real  # (R,) the sum of those that are too slow
+    weight: Real  # (G,m) of the entries in each sum
+    slow: Real  # (R,G) the sums of states that are not kept
     size: Real
     state: Real
     times: Real
 
     def begin(self, times: Real) -> None:
         """Forget all states, before a run over these times (s)."""
-        self.size[:], self.state[:] = self.slow[:, None], np.nan
-        self.times[:] = times[0], self.size.shape[1] / max(times[-1] - times[0], np.finfo(float).tiny)
+        self.size[:], self.state[:] = self.slow[:, :, None], np.nan
+        self.times[:] = times[0], self.size.shape[2] / max(times[-1] - times[0], _SHORTEST)
 
     def of_run(self, run: int) -> Real:
         """The states (k,1+n) that are kept of a run."""
-        found = self.state[run]
+        found = self.state[run].reshape(-1, self.state.shape[3])
         return found[~np.isnan(found[:, 0])]
 
 
@@ -72,29 +72,30 @@ class RecordedSteps:
 
 
 @helper
-def _place_if_fast(t, total, f, run):
-    """The place for a state of a run whose speeds sum up to this; -1 if it is not the fastest of its part of time."""
-    if not total > f.slow[run]:
+def _place_if_larger(t, total, f, run, g):
+    """The place for a state of a run with such a sum; -1 if it is not the largest of its part of time."""
+    if not total > f.slow[run, g]:
         return -1
     part = (t - f.times[0]) * f.times[1]
-    place = min(int(part), f.size.shape[1] - 1) if part > 0.0 else 0
-    if not total > f.size[run, place]:
+    place = min(int(part), f.size.shape[2] - 1) if part > 0.0 else 0
+    if not total > f.size[run, g, place]:
         return -1
-    f.size[run, place] = total
+    f.size[run, g, place] = total
     return place
 
 
 @helper
 def _keep_if_fast(t, y, f):
-    """Keep a state in place of the slowest one that is kept, if it is faster."""
-    total = 0.0
-    for i in range(f.entry.shape[0]):
-        total += f.weight[i] * abs(y[f.entry[i]])
-    place = _place_if_fast(t, total, f, 0)
-    if place >= 0:
-        f.state[0, place, 0] = t
-        for i in range(1, f.state.shape[2]):
-            f.state[0, place, i] = y[i - 1]
+    """Keep a state in place of the one that is kept of its part of time, if a sum is larger."""
+    for g in range(f.weight.shape[0]):
+        total = 0.0
+        for i in range(f.entry.shape[0]):
+            total += f.weight[g, i] * abs(y[f.entry[i]])
+        place = _place_if_larger(t, total, f, 0, g)
+        if place >= 0:
+            f.state[0, g, place, 0] = t
+            for i in range(1, f.state.shape[3]):
+                f.state[0, g, place, i] = y[i - 1]
 
 
 @helper
@@ -175,18 +176,17 @@ def watching(record: RecordedSteps, watch: Watch) -> Watch:
     return watch.seeing(len(watch.signal), look, record)
 
 
-def fastest_states(weights: Real, slow: Sequence[float], parts: int, numbers: int) -> FastestStates:
-    """Room for a state in each of so many parts of time, of so many first numbers of y, of one run for each sum of
-    speeds that is too slow; weights (numbers,): of these numbers, zero for those that are not watched."""
-    entry, size = np.flatnonzero(weights), (len(slow), parts)
-    return FastestStates(
-        entry, weights[entry], np.array(slow, float), np.zeros(size), np.zeros((*size, 1 + numbers)), np.zeros(2)
-    )
+def fastest_states(weights: Real, slow: Real, parts: int) -> FastestStates:
+    """Room for a state of each of R runs in each of so many parts of time, for G sums; weights (G,n): of the first n
+    numbers of y in these, slow (R,G): sums that are too small."""
+    entry, size = np.flatnonzero(weights.any(axis=0)), (*slow.shape, parts)
+    kept, room = np.ascontiguousarray(weights[:, entry]), np.zeros((*size, 1 + weights.shape[1]))
+    return FastestStates(entry, kept, slow, np.zeros(size), room, np.zeros(2))
 
 
 def nothing_fast() -> FastestStates:
     """Of runs in which nobody looks at speeds."""
-    return fastest_states(np.zeros(0), [np.inf], 0, 0)
+    return fastest_states(np.zeros((0, 0)), np.zeros((1, 0)), 0)
 
 
 def recorded(
@@ -232,29 +232,31 @@ def lane_project(s, r):
     """Project s.trial, and keep the states of those lanes that go on from them, or have a sample there."""
     nothing_at(r.address[0], (r.address[1], r.address[2]))
     f, entries = r.fastest, r.entries
-    total = 0.0
-    for i in range(f.entry.shape[0]):
-        total += f.weight[i] * abs(s.trial[f.entry[i]])
-    s.norm[2] = total  # nobody needs it beyond the first step
-    for lane in range(LANES):
-        if entries.chosen[0, lane] == 1.0:
-            place = _place_if_fast(entries.time[0, lane], entries.norm[2, lane], f, lane)
-            if place >= 0:
-                f.state[lane, place, 0] = entries.time[0, lane]
-                for i in range(1, f.state.shape[2]):
-                    f.state[lane, place, i] = entries.trial[i - 1, lane]
+    for g in range(f.weight.shape[0]):
+        total = 0.0
+        for i in range(f.entry.shape[0]):
+            total += f.weight[g, i] * abs(s.trial[f.entry[i]])
+        s.norm[2] = total  # nobody needs it beyond the first step
+        for lane in range(LANES):
+            if entries.chosen[0, lane] == 1.0:
+                place = _place_if_larger(entries.time[0, lane], entries.norm[2, lane], f, lane, g)
+                if place >= 0:
+                    f.state[lane, g, place, 0] = entries.time[0, lane]
+                    for i in range(1, f.state.shape[3]):
+                        f.state[lane, g, place, i] = entries.trial[i - 1, lane]
 
 
-def record_of_lanes(entries: LaneEntries, fastest: FastestStates) -> RecordedLanes:
-    """A record for one thread, of LANES runs after the other."""
-    return RecordedLanes(np.zeros(3, np.int64), entries, fastest)
+def record_of_lanes(stages: LaneStages, entries: LaneEntries, fastest: FastestStates) -> tuple[RecordedLanes, Pointer]:
+    """A record for one thread, of LANES runs after the other, and the kernel that keeps it."""
+    record = RecordedLanes(np.zeros(3, np.int64), entries, fastest)
+    return record, pointer(lane_project, VOID, stages, record)
 
 
-def recorded_lanes(posed: LaneProblem, stages: LaneStages, record: RecordedLanes, times: Real) -> LaneProblem:
-    """The same problem with a record of its fastest states, which begins anew with all lanes."""
+def recorded_lanes(posed: LaneProblem, own: tuple[RecordedLanes, Pointer], times: Real) -> LaneProblem:
+    """The same problem with its record, which begins anew with all lanes."""
+    record, project = own
     tables = posed.stages.kernel_address, posed.manifold.kernel_address
     record.address[:] = posed.project.__wrapper_address__(), *tables
     record.fastest.begin(times)
     record.entries.chosen[:] = 1.0
-    own = pointer(lane_project, VOID, stages, record)
-    return posed._replace(project=own, manifold=AnyBundle(record))
+    return posed._replace(project=project, manifold=AnyBundle(record))

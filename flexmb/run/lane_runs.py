@@ -19,6 +19,7 @@ from flexmb.integrate.recorded import (
     FastestStates,
     RecordedLanes,
     RecordedSteps,
+    fastest_states,
     record_of_lanes,
     recorded,
     recorded_lanes,
@@ -27,8 +28,9 @@ from flexmb.integrate.rk4_lanes import rk4_lanes
 from flexmb.integrate.settings import Settings
 from flexmb.integrate.watch import nothing_watched
 from flexmb.jit.lanes import LANES
+from flexmb.jit.pointer import Pointer
 from flexmb.run.origin import Beginning
-from flexmb.run.propagate import NO_STATES, Integration, recursion, states_to_keep, watched_turns
+from flexmb.run.propagate import NO_STATES, PARTS, Integration, kept_for_watches, recursion, room_for
 from flexmb.run.switching import segment_ends
 from flexmb.system import algorithms
 from flexmb.system.batch import Batch, LaneTables, in_threads
@@ -73,13 +75,16 @@ def runs(q: Real, u: Real, samples: int) -> Runs:
 class BatchRun:
     """Runs of the copies of a batch by one method.
 
-    turned: by copy that has reached its end, which bodies turned too fast for their level at any step.
+    turned: by copy that has reached its end, which bodies turned too fast for their level at any step; bent: states
+    (K,1+nq+nu), see `flexmb.run.propagate.Raw`, in which its beams of level exact may have bent too far.
     """
 
     def __init__(self, batch: Batch, times: Real, settings: Settings, found: Runs) -> None:
         self._batch, self._times, self._settings, self._found = batch, times, settings, found
         self.turned: dict[int, list[TooFast]] = {}
-        self._turns = [watched_turns(system) for system in batch.systems]
+        self.bent: dict[int, Real] = {}
+        self._kept = [kept_for_watches(system) for system in batch.systems]
+        self._strained = len(batch.systems[0].constants.section) > 0
         fixed = settings.integrator.fixed
         self._ends = [segment_ends(system, times[0], times[-1], fixed) for system in batch.systems]
 
@@ -107,16 +112,16 @@ class BatchRun:
 
     def _in_lanes(self, firsts: Iterable[int]) -> None:
         with self._batch.tables() as tables:
-            watched = [each for each in self._turns if each is not None]
+            watched = [each for each in self._kept if each is not None]
             record = None
             if watched:  # a larger weight keeps more states than are needed
                 heaviest = np.max([each.weights for each in watched], axis=0)
-                fastest = states_to_keep(self._batch.systems[0], watched[0]._replace(weights=heaviest), LANES)
-                record = record_of_lanes(tables.entries, fastest)
+                fastest = fastest_states(heaviest, np.full((LANES, len(heaviest)), np.inf), PARTS)
+                record = record_of_lanes(tables.stages, tables.entries, fastest)
             for first in firsts:
                 self._block(first, tables, record)
 
-    def _block(self, first: int, tables: LaneTables, record: RecordedLanes | None) -> None:
+    def _block(self, first: int, tables: LaneTables, record: tuple[RecordedLanes, Pointer] | None) -> None:
         """Run LANES copies at once; those that end with a status that is not in _DECIDED are left for single runs."""
         w, s, entries, _ = tables
         place = slice(first, first + LANES)
@@ -126,9 +131,10 @@ class BatchRun:
         constants = self._batch.constants(first // LANES, w)
         problem = lane_problem(lanes.rhs, lanes.project, s, constants, w)
         if record is not None:
-            turns = self._block_of(self._turns, first)
-            record.fastest.slow[:] = [np.inf if each is None else each.slow for each in turns]
-            problem = recorded_lanes(problem, s, record, self._times)
+            fastest = record[0].fastest
+            for lane, kept in enumerate(self._block_of(self._kept, first)):
+                fastest.slow[lane] = np.inf if kept is None else kept.slow
+            problem = recorded_lanes(problem, record, self._times)
         if first_derivative(problem, s, entries, self._times[0], found.counts) != OK or w.doubt[0]:
             self._examine(first, found.status)
         accuracy = self._settings.accuracy(self._batch.nq, self._batch.nu)
@@ -149,18 +155,24 @@ class BatchRun:
             stopped_at = np.full(LANES, t)
         for lane in np.flatnonzero((found.status == _NOT_YET) & np.isin(status, _DECIDED)):
             found.status[lane], found.stopped_at[lane] = status[lane], stopped_at[lane]
-        if record is not None and not np.isnan(record.fastest.state[:, :, 0]).all():
-            self._look_at_turns(first, tables, constants, record.fastest)
+        if record is not None and not np.isnan(fastest.state[..., 0]).all():
+            self._look_at(first, tables, constants, fastest)
 
-    def _look_at_turns(self, first: int, tables: LaneTables, constants: Constants, fastest: FastestStates) -> None:
+    def _look_at(self, first: int, tables: LaneTables, constants: Constants, fastest: FastestStates) -> None:
         """Which bodies of LANES copies turned too fast, by the velocities that a right-hand side leaves."""
-        from flexmb.system.level_range import of_runs  # imported here as many scenes have no flexible bodies
+        from flexmb.system.level_range import of_runs, weights  # imported here as many scenes have no flexible bodies
 
         w, s, entries, _ = tables
-        size = np.where(np.isnan(fastest.state[:, :, 0]), 0.0, fastest.size)
-        size[self._found.status[first : first + LANES] != OK] = 0.0
+        systems = self._block_of(self._batch.systems, first)
+        ended = self._found.status[first : first + LANES] == OK
+        if self._strained:
+            self.bent.update({first + lane: fastest.of_run(lane) for lane in np.flatnonzero(ended)})
+        states = fastest.state.reshape(LANES, -1, fastest.state.shape[3])
+        u = np.where(ended[:, None, None], np.nan_to_num(np.abs(states[:, :, 1 + self._batch.nq :])), 0.0)
+        watched = np.isfinite(fastest.slow[:, 0, None])
+        size = np.einsum("rku,ru->rk", u, np.where(watched, [weights(system) for system in systems], 0.0))
         order = np.argsort(-size, axis=1, kind="stable")
-        states = np.take_along_axis(fastest.state, order[:, :, None], axis=1)
+        states = np.take_along_axis(states, order[:, :, None], axis=1)
         t = np.where(np.isnan(states[:, :, 0]), self._times[0], states[:, :, 0])
 
         def turns(n: int) -> Real:
@@ -168,7 +180,6 @@ class BatchRun:
             lanes.rhs(s, constants, w)
             return np.moveaxis(w.body["velocity"][:, :3], -1, 0)
 
-        systems = self._block_of(self._batch.systems, first)
         for lane, found in enumerate(of_runs(systems, t, np.take_along_axis(size, order, axis=1), turns)):
             if found:
                 self.turned[first + lane] = found
@@ -201,8 +212,10 @@ class BatchRun:
             clock, out, counts = Clock(self._times, ends), found.out[copy], found.counts[copy]
             status, t = solve(found.y[copy].copy(), clock, accuracy, out, counts)
             found.status[copy], found.stopped_at[copy], found.fault[copy] = status, t, solve.fault
-            if status == OK and len(solve.fastest) and (turned := _too_fast(system, solve.fastest)):
-                self.turned[copy] = turned
+            if status == OK and len(solve.fastest):
+                self.bent[copy] = solve.fastest
+                if "level_range" not in system.scene.allow and (turned := _too_fast(system, solve.fastest)):
+                    self.turned[copy] = turned
 
 
 def _too_fast(system: System, states: Real) -> list[TooFast]:
@@ -226,8 +239,8 @@ class Alone:
             self._workspace = system.workspace()
             self._problem = recursion(system.constants, self._workspace)
             self._record: RecordedSteps | None = None
-            if (turns := watched_turns(system)) is not None:
-                self._problem, self._record = recorded(self._problem, 0, states_to_keep(system, turns))
+            if (kept := kept_for_watches(system)) is not None:
+                self._problem, self._record = recorded(self._problem, 0, room_for(kept))
 
     def __call__(self, y: Real, clock: Clock, accuracy: Accuracy, out: Real, counts: Index) -> tuple[int, float]:
         """See `Integrator`; out (T,nq+nu+1) does not contain the states of controllers."""

@@ -35,10 +35,12 @@ from flexmb.typing import Index, Real
 if TYPE_CHECKING:
     from flexmb.control.feedback import Feedback
     from flexmb.control.memory import LoopMemory
-    from flexmb.system.level_range import TurnsToWatch
+    from flexmb.system.watches import StatesToKeep
 
 
 NO_STATES: Real = np.zeros((0, 0))
+PARTS = 32
+"""Of a run's time, in each of which watches of accuracy look at the states that turn and that bend most."""
 
 
 class Raw(NamedTuple):
@@ -46,7 +48,7 @@ class Raw(NamedTuple):
 
     y (n,): the last good state; memory, controllers: what is needed to resume there, None if a leap passed the end;
     paused: whether it stopped at the level of an event; fastest (K,1+nq+nu): t (s), q and u of states in which bodies
-    may have turned faster than their level describes.
+    may have turned or bent more than their models describe.
     """
 
     states: Real
@@ -69,19 +71,18 @@ def recursion(constants: Constants, workspace: Any) -> Problem:
     return problem(articulated.rhs, coordinates.project, constants, workspace)
 
 
-def watched_turns(system: System) -> TurnsToWatch | None:
-    """Which states of a run are kept for the watch of levels; None where no body can turn too fast for its level."""
+def kept_for_watches(system: System) -> StatesToKeep | None:
+    """By which states at ends of steps the watches of accuracy look at a run; None if at none."""
     if all(link.is_rigid for link in system.links):
         return None
-    from flexmb.system.level_range import turns_to_watch  # imported here as many scenes have no flexible bodies
+    from flexmb.system.watches import states_to_keep  # imported here as many scenes have no flexible bodies
 
-    return turns_to_watch(system)
+    return states_to_keep(system)
 
 
-def states_to_keep(system: System, turns: TurnsToWatch, runs: int = 1) -> FastestStates:
-    """Room for the fastest states of runs of a system."""
-    weights = np.concatenate([np.zeros(system.nq), turns.weights])
-    return fastest_states(weights, [turns.slow] * runs, turns.parts, system.nq + system.nu)
+def room_for(kept: StatesToKeep) -> FastestStates:
+    """Of one run."""
+    return fastest_states(kept.weights, kept.slow[None].copy(), PARTS)
 
 
 class Integration:
@@ -117,7 +118,7 @@ class Integration:
             moving = route.rhs, constants, self._workspace
             self.batch = batch(system, moving, algorithm.observing, system.nq + system.nu + 1)
         self._enter: Any = None  # the compiled integrator
-        self._turns = watched_turns(system)
+        self._kept = kept_for_watches(system)
         self._posed, self._record = self._recording()
         self._at_first = [(array, array.copy()) for array in route.remembered(constants)]
 
@@ -141,10 +142,10 @@ class Integration:
         return seen if self._record is None else watching(self._record, seen)
 
     def _recording(self) -> tuple[Any, RecordedSteps | None]:
-        """The problem; if bodies may turn too fast for their levels it keeps its fastest states."""
-        if self._turns is None:
+        """The problem; if watches of accuracy look at ends of steps it keeps those that turn or bend most."""
+        if self._kept is None:
             return self._problem, None
-        return recorded(self._problem, 0, states_to_keep(self.system, self._turns))
+        return recorded(self._problem, 0, room_for(self._kept))
 
     @property
     def fastest(self) -> Real:

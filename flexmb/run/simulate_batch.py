@@ -17,6 +17,7 @@ from flexmb.run.batch_trajectory import BatchTrajectory
 from flexmb.run.beside import computed
 from flexmb.run.interruption import interruptible
 from flexmb.run.lane_runs import BatchRun, Runs, runs
+from flexmb.run.propagate import NO_STATES
 from flexmb.run.samples import sample_times
 from flexmb.run.simulate import RunSettings, refuse_unknown, refuse_without_jacobian
 from flexmb.run.switching import refuse_times
@@ -81,33 +82,33 @@ def simulate_batch(
     _refuse_too_many(len(rows[0]), len(times), batch)
     found = runs(*rows, len(times))
     turned: dict[int, list[TooFast]] = {}
+    bent: dict[int, Real] = {}
     if len(rows[0]):
         start, stop = perf_counter(), found.counts.T[STOP : STOP + 1]  # stops all runs at once
         runner = BatchRun(batch, times, chosen, found)
         _, interrupted = interruptible(runner, (len(rows[0]), number), stop)
         if interrupted:
             raise KeyboardInterrupt
-        turned = runner.turned
+        turned, bent = runner.turned, runner.bent
         if batch.in_lanes and not chosen.integrator.linearises and not batch.system(0).scene.controllers:
             computed(batch.system(0), perf_counter() - start, BATCHES)
     made = _gathered(batch, times, found, len(rows[0]))
-    for warning in _watched(made, turned):
+    for warning in _watched(made, turned, bent):
         warnings.warn(warning, SceneWarning, stacklevel=2)
     return made
 
 
-def _watched(runs: BatchTrajectory, turned: Mapping[int, Sequence[TooFast]]) -> Iterator[str]:
+def _watched(runs: BatchTrajectory, turned: Mapping[int, Sequence[TooFast]], bent: Mapping[int, Real]) -> Iterator[str]:
     """What watches of accuracy say: of each body and each watch once, of the worst copy, with the numbers of all.
 
-    turned: by copy that has reached its end, which bodies turned too fast for their level. Strains of level exact are
-    looked at as in single runs, at the output times.
+    turned, bent: see `BatchRun`.
     """
     batch, found = runs.batch, dict[tuple[str, str], dict[int, Said]]()
     strained = len(batch.systems[0].constants.section) > 0
     failed = set(runs.failed.tolist())
     for copy in range(len(runs.status)) if strained else sorted(turned.keys() | failed):
         if strained or copy in failed:
-            own = said(_seen(runs, copy, turned.get(copy, ())))
+            own = said(_seen(runs, copy, turned.get(copy, ()), bent.get(copy, NO_STATES)))
         else:
             own = [Said(each, "level_range") for each in turned[copy]]
         for each in own:
@@ -117,7 +118,7 @@ def _watched(runs: BatchTrajectory, turned: Mapping[int, Sequence[TooFast]]) -> 
         yield f'scene "{batch.systems[0].scene.name}": {alike[worst]}{_called(sorted(alike), worst)}'
 
 
-def _seen(runs: BatchTrajectory, copy: int, turned: Sequence[TooFast]) -> WatchedStates:
+def _seen(runs: BatchTrajectory, copy: int, turned: Sequence[TooFast], bent: Real) -> WatchedStates:
     """A copy as watches of accuracy see it; one that has failed by its output times."""
     system, failed = runs.batch.system(copy), bool(runs.status[copy] != OK)
     reached = np.isfinite(runs.q[copy]).all(axis=1)
@@ -126,7 +127,7 @@ def _seen(runs: BatchTrajectory, copy: int, turned: Sequence[TooFast]) -> Watche
     def turns(n: int) -> Real:
         return system.turns(float(t[n]), q[n], u[n])
 
-    return WatchedStates(system, t, q, u, turns, failed, turned=None if failed else turned)
+    return WatchedStates(system, t, q, u, turns, failed, fastest=bent, turned=None if failed else turned)
 
 
 def _called(copies: list[int], worst: int) -> str:

@@ -39,7 +39,8 @@ _MOST = 2e7
 
 class Unfollowed(NamedTuple):
     """At t (s), the `points` along each piece of a beam put its sections `position` (m) and `rotation` (rad) away from
-    where its strains have them. `enough`: points that would do, None where only more pieces help."""
+    where its strains have them; length (m) of the beam. `enough`: points that would do, None where only more pieces
+    help."""
 
     body: str
     t: float
@@ -47,10 +48,11 @@ class Unfollowed(NamedTuple):
     position: float
     rotation: float
     enough: int | None
+    length: float
 
     @property
     def size(self) -> float:
-        return self.rotation
+        return max(self.rotation, self.position / self.length)
 
     @property
     def what(self) -> str:
@@ -75,7 +77,12 @@ def unfollowed(arrays: SceneArrays, t: Real, q: Real) -> Iterator[Unfollowed]:
             continue
         eta = q[:, arrays.coordinate(f"{body.name}.modes")]
         most = [_error(body, eta[i], float(t[i]), turn) for i, turn in _suspects(field, eta)]
-        yield from sorted((each for each in most if each is not None), key=lambda each: -each.rotation)[:1]
+        yield from sorted((each for each in most if each is not None), key=lambda each: -each.size)[:1]
+
+
+def weights(field: StrainField) -> Real:
+    """(m,) Of the sizes of strains in a sum that is below 1 where nothing is looked at."""
+    return np.max(np.linalg.norm(field.rows[: field.steps, WHOLE], axis=1), axis=0, initial=0.0) / SMALL_TURN
 
 
 def _suspects(field: StrainField, eta: Real) -> list[tuple[int, float]]:
@@ -87,8 +94,7 @@ def _suspects(field: StrainField, eta: Real) -> list[tuple[int, float]]:
 
 
 def _error(body: BeamBody, eta: Real, t: float, turn: float) -> Unfollowed | None:
-    """What the points of the beam leave of these strains (m,), which turn by so many rad, if it is more than ALLOWED.
-    """
+    """What the points of the beam leave of these strains (m,), which turn by so many rad, if it is beyond ALLOWED."""
     points = points_of_piece(body)
     at_rest = max((part.turn for part in turns_of_pieces(body)), default=0.0)
     finest = max(2 * points + 8, follow(turn + at_rest, ALLOWED**2))
@@ -109,7 +115,8 @@ def _error(body: BeamBody, eta: Real, t: float, turn: float) -> Unfollowed | Non
     while enough - few > 1:
         middle = (few + enough) // 2
         few, enough = (few, middle) if is_enough(left(middle)) else (middle, enough)
-    return Unfollowed(body.name, t, points, position, rotation, enough if enough < min(finest, MOST_POINTS) else None)
+    needed = enough if enough < min(finest, MOST_POINTS) else None
+    return Unfollowed(body.name, t, points, position, rotation, needed, body.length_m)
 
 
 def _seen(body: BeamBody, points: int, eta: Real) -> tuple[Real, Real]:

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from flexmb.modal.strain_field import StrainField
 from flexmb.scene.bodies import BeamBody
 from flexmb.scene.pieces import edges
 from flexmb.scene.rest_turn import turns_of_pieces
@@ -69,6 +70,19 @@ def unresolved(arrays: SceneArrays, t: Real, q: Real) -> Iterator[Unresolved]:
         found = max(_worst(body, t, np.abs(eta @ field.columns.T)), key=lambda each: each.position, default=None)
         if found is not None and found.position > ALLOWED * body.length_m:
             yield found
+
+
+def weights(body: BeamBody, field: StrainField) -> Real:
+    """(m,) Of the sizes of modes in a sum that is below 1 where nothing is said: no coefficient left out is larger than
+    those that there are."""
+    assert field.columns is not None  # of a beam whose strains are polynomials
+    lengths, found, column = np.diff(edges(body)), np.zeros(field.columns.shape[1]), 0
+    for strain, count in polynomials(body).items():
+        for length in lengths:
+            left = (length / (2 * count + 1)) ** 2 / (ALLOWED * body.length_m) if strain in CURVATURES else 0.0
+            rows = left * np.abs(field.columns[column : column + count])
+            found, column = np.max([found, *rows], axis=0), column + count
+    return found
 
 
 def _worst(body: BeamBody, t: Real, size: Real) -> Iterator[Unresolved]:

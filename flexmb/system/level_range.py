@@ -62,60 +62,45 @@ def too_fast(system: System, t: Real, u: Real, turns: Callable[[int], Real]) -> 
     turns: angular velocities (N,3) rad/s of the bodies in a state, by its number, as `System.turns`.
     """
     if _firsts(system):
-        size = np.abs(u) @ _weights(system)
+        size = np.abs(u) @ weights(system)
         order = np.argsort(-size, kind="stable")[:LOOKED_AT]
         yield from of_runs([system], t[None, order], size[None, order], lambda n: turns(int(order[n]))[None])[0]
 
 
 def of_runs(systems: Sequence[System], t: Real, size: Real, turns: Callable[[int], Real]) -> list[list[TooFast]]:
     """The same of R runs of one structure each, from states at t (R,K) s, in descending order of `size` (R,K): what no
-    body's turn exceeds in parts of its lowest frequency, see `turns_to_watch`.
+    body's turn exceeds in parts of what it is allowed, see `weights`.
 
     turns: angular velocities (R,N,3) rad/s of the bodies in the n-th state of each run.
     """
     watched = sorted({k for system in systems for k in _firsts(system)})
     firsts = np.array([[_firsts(system).get(k, np.inf) for k in watched] for system in systems])
+    allowed = np.sqrt(ALLOWED) * firsts
     fastest, at = np.zeros(firsts.shape), np.zeros(firsts.shape, np.int64)
     for n in range(size.shape[1]):
-        if not np.any(size[:, n, None] > (1.0 + ROUNDING) * np.maximum(fastest, np.sqrt(ALLOWED))):
+        if not np.any(size[:, n, None] > (1.0 + ROUNDING) * np.maximum(fastest, 1.0)):
             break
         w = turns(n)
-        rate = np.column_stack([_across(systems, k, w[:, k]) for k in watched]) / firsts
+        rate = np.column_stack([_across(systems, k, w[:, k]) for k in watched]) / allowed
         faster = rate > fastest
         fastest[faster], at[faster] = rate[faster], n
     found: list[list[TooFast]] = [[] for _ in systems]
-    for run, j in zip(*np.nonzero(fastest > np.sqrt(ALLOWED)), strict=True):
+    for run, j in zip(*np.nonzero(fastest > 1.0), strict=True):
         link, when, first = systems[run].links[watched[j]], float(t[run, at[run, j]]), float(firsts[run, j])
-        rate_of = float(fastest[run, j]) * first
-        found[run].append(TooFast(link.name, link.level.name, when, rate_of, first, _remedy(link)))
+        turn = float(fastest[run, j] * allowed[run, j])
+        found[run].append(TooFast(link.name, link.level.name, when, turn, first, _remedy(link)))
     return found
 
 
-class TurnsToWatch(NamedTuple):
-    """Weights (nu,) of the sizes of speeds in a sum that no body's turn exceeds in parts of its lowest frequency, but
-    by what modes turn; up to where nothing is said of that sum; and in how many parts of its time the state of a run
-    in which it is largest is looked at."""
-
-    weights: Real
-    slow: float
-    parts: int
-
-
-def turns_to_watch(system: System) -> TurnsToWatch | None:
-    """None where no body can turn too fast, or the scene waives it."""
-    if "level_range" in system.scene.allow or not _firsts(system) or not _weights(system).any():
-        return None
-    return TurnsToWatch(_weights(system), float(np.sqrt(ALLOWED)), LOOKED_AT)
-
-
-def _weights(system: System) -> Real:
-    """See `TurnsToWatch`: the largest over the bodies that a speed turns; kept.
+def weights(system: System) -> Real:
+    """(nu,) Of the sizes of speeds in a sum that no body's turn exceeds in parts of what it is allowed, but by what
+    modes turn: the largest over the bodies that a speed turns; kept.
 
     A single axis of a body's own hinge counts by its part across the body, so that shafts may turn as they like.
     """
-    weights: Real | None = system.kept.get("level_range weights")
-    if weights is None:
-        weights, body = np.zeros(system.nu), system.constants.body
+    found: Real | None = system.kept.get("level_range weights")
+    if found is None:
+        found, body = np.zeros(system.nu), system.constants.body
         for k, first in _firsts(system).items():
             at = k
             while at >= 0:
@@ -123,10 +108,10 @@ def _weights(system: System) -> Real:
                 is_own_axis = at == k and body["axis"][at] == ANGULAR_Z
                 part = float(_across([system], k, np.eye(3)[2:])[0]) if is_own_axis else 1.0
                 for n in set(range(body["nv"][at])) - set(kind.displacements):
-                    weights[place + n] = max(weights[place + n], part / first)
+                    found[place + n] = max(found[place + n], part / (np.sqrt(ALLOWED) * first))
                 at = int(body["parent"][at])
-        weights = system.kept.setdefault("level_range weights", weights)
-    return weights
+        found = system.kept.setdefault("level_range weights", found)
+    return found
 
 
 def _firsts(system: System) -> dict[int, float]:

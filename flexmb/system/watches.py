@@ -14,6 +14,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from flexmb.scene.bodies import BeamBody
 from flexmb.scene.problems import Doubt, Place, SceneWarning
 from flexmb.scene.schema import Waiver
 from flexmb.system.system import System
@@ -41,6 +42,17 @@ class WatchedStates(NamedTuple):
     loads: Mapping[str, Real] | None = None
     fastest: Real = _NONE
     turned: Sequence[AccuracyFinding] | None = None
+
+    def with_steps(self) -> tuple[Real, Real, Real]:
+        """t, q and u of all states, those at ends of steps last."""
+        more, nq = self.fastest, self.system.nq
+        if not len(more):
+            return self.t, self.q, self.u
+        return (
+            np.r_[self.t, more[:, 0]],
+            np.vstack([self.q, more[:, 1 : 1 + nq]]),
+            np.vstack([self.u, more[:, 1 + nq :]]),
+        )
 
 
 class AccuracyFinding(Protocol):
@@ -80,13 +92,10 @@ def _level_range(seen: WatchedStates) -> Iterator[AccuracyFinding]:
         return iter(seen.turned)
     from flexmb.system.level_range import too_fast  # imported here because many scenes have no flexible bodies
 
-    system, T, more = seen.system, len(seen.t), seen.fastest
-    if not len(more):
-        return too_fast(system, seen.t, seen.u, seen.turns)
-    t, u = np.r_[seen.t, more[:, 0]], np.vstack([seen.u, more[:, 1 + system.nq :]])
+    (t, q, u), system = seen.with_steps(), seen.system
 
     def turns(n: int) -> Real:
-        return seen.turns(n) if n < T else system.turns(float(t[n]), more[n - T, 1 : 1 + system.nq], u[n])
+        return seen.turns(n) if n < len(seen.t) else system.turns(float(t[n]), q[n], u[n])
 
     return too_fast(system, t, u, turns)
 
@@ -94,13 +103,15 @@ def _level_range(seen: WatchedStates) -> Iterator[AccuracyFinding]:
 def _few_points(seen: WatchedStates) -> Iterator[AccuracyFinding]:
     from flexmb.system.enough_points import unfollowed  # imported here because few scenes have such beams
 
-    return unfollowed(seen.system, seen.t, seen.q)
+    t, q, _ = seen.with_steps()
+    return unfollowed(seen.system, t, q)
 
 
 def _few_polynomials(seen: WatchedStates) -> Iterator[AccuracyFinding]:
     from flexmb.system.enough_polynomials import unresolved  # imported here because few scenes have such beams
 
-    return unresolved(seen.system, seen.t, seen.q)
+    t, q, _ = seen.with_steps()
+    return unresolved(seen.system, t, q)
 
 
 def _held_stretch(seen: WatchedStates) -> Iterator[AccuracyFinding]:
@@ -124,6 +135,48 @@ WATCHES = (
 
 WAIVERS: tuple[Waiver, ...] = tuple(watch.waiver for watch in WATCHES)
 """For scenes whose levels, points and polynomials are compared with one another."""
+
+
+class StatesToKeep(NamedTuple):
+    """Weights (G,nq+nu) of the sizes of coordinates and speeds in a sum of turns and, where there are beams of level
+    exact, one of strains; where a sum is below `slow` (G,), there is nothing to say of its kind."""
+
+    weights: Real
+    slow: Real
+
+
+def states_to_keep(system: System) -> StatesToKeep | None:
+    """By which states at ends of steps the watches look at a run; None if at none."""
+    if all(link.is_rigid for link in system.links):
+        return None
+    sums = 2 if len(system.constants.section) else 1
+    found = StatesToKeep(np.zeros((sums, system.nq + system.nu)), np.full(sums, np.inf))
+    if "level_range" not in system.scene.allow:
+        from flexmb.system.level_range import weights  # imported here because many scenes have no flexible bodies
+
+        found.weights[0, system.nq :] = weights(system)
+    if sums == 2 and not {"few_points", "few_polynomials"} <= set(system.scene.allow):
+        found.weights[1] = _of_strains(system)
+    found.slow[found.weights.any(axis=1)] = 1.0
+    return found if found.weights.any() else None
+
+
+def _of_strains(system: System) -> Real:
+    """The weights (nq+nu,) of strains; kept."""
+    from flexmb.system import enough_points, enough_polynomials  # imported here because few scenes have such beams
+
+    found: Real | None = system.kept.get("weights of strains")
+    if found is None:
+        bodies = {body.name: body for body in system.scene.bodies if isinstance(body, BeamBody)}
+        found = np.zeros(system.nq + system.nu)
+        for link in system.links:
+            if link.name in bodies and not link.is_rigid and (field := link.model.field) is not None:
+                own = enough_points.weights(field)
+                if field.columns is not None:
+                    own = np.maximum(own, enough_polynomials.weights(bodies[link.name], field))
+                found[system.coordinate(f"{link.name}.modes")] = own
+        found = system.kept.setdefault("weights of strains", found)
+    return found
 
 
 def said(seen: WatchedStates) -> list[Said]:

@@ -179,7 +179,7 @@ def test_batches_warn_of_what_single_runs_warn(method, apart, monkeypatch):
     worst = int(named.split("; copy ")[1].split()[0])
     assert worst == 9 and facts(said_of) == pytest.approx(facts(alone[worst]), rel=1e-3)
     if apart:  # negative control: by the output times alone nothing is seen
-        monkeypatch.setattr(lane_runs.BatchRun, "_look_at_turns", lambda *_: None)
+        monkeypatch.setattr(lane_runs.BatchRun, "_look_at", lambda *_: None)
         monkeypatch.setattr(lane_runs.Alone, "fastest", np.zeros((0, 0)))
         assert warned(fm.simulate_batch, copies, TURN_S, method, **given) == []
 

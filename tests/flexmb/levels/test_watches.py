@@ -16,6 +16,7 @@ from msgspec.structs import replace
 
 import flexmb as fm
 from flexmb.scene import schema as s
+from flexmb.system import watches
 from flexmb.system.enough_polynomials import ALLOWED
 from flexmb.system.watches import WAIVERS, WATCHES
 from tests.flexmb.levels.strain_beams import PLANE, beam
@@ -112,6 +113,40 @@ def test_every_door_tells_of_few_polynomials_and_points(door):
         assert len(words) == 1 and 'beam "rod"' in words[0], words
         waived = replace(scene, allow=(*scene.allow, waiver))
         assert not any(re.search(pattern, word) for word in told(ANSWERS[door], waived))
+
+
+SWING_S = 10.0
+"""Of a force that rises and falls again; the rod follows by a third of a second."""
+
+
+def swung(force, **given):
+    """Straight at both output times, and bent in between."""
+    builder, function = bent(**given), fm.Sine(amplitude=force, angular_frequency_rad_s=np.pi / SWING_S)
+    (push,) = builder.loads
+    return replace(builder, loads=(replace(push, function=function),))
+
+
+@pytest.mark.parametrize("method", ["dop853", "radau5"])
+@pytest.mark.parametrize(("given", "waiver"), [({}, "few_polynomials"), ({"count": 4, "points": 5}, "few_points")])
+def test_what_bends_between_output_times_is_noticed(method, given, waiver, monkeypatch):
+    """In runs and batches, which name the copies; negative control: by the output times alone nothing is."""
+    scenes = [swung(force, **given) for force in (0.3, 7.0, 0.5, 6.5)]
+    if waiver == "few_points":
+        scenes = [replace(each, allow=(*each.allow, "few_polynomials")) for each in scenes]
+    settings = {"method": method, "samples": 2, "rtol": 1e-4, "atol": 1e-6}
+
+    def runs():
+        return [told(lambda scene: fm.simulate(scene, SWING_S, **settings), scene) for scene in scenes]
+
+    def batch():
+        return told(lambda scenes: fm.simulate_batch(scenes, SWING_S, **settings), scenes)
+
+    single, (word,) = runs(), batch()
+    assert [len(words) for words in single] == [0, 1, 0, 1]
+    assert "(copies 1, 3; copy 1 is the worst)" in word
+    assert 'beam "rod" bends more' in word and word.split(" at t = ")[0] == single[1][0].split(" at t = ")[0]
+    monkeypatch.setattr(watches.WatchedStates, "with_steps", lambda seen: (seen.t, seen.q, seen.u))
+    assert not any(runs()) and not batch()
 
 
 def test_the_polynomials_that_are_named_are_enough():
