@@ -72,15 +72,15 @@ class RecordedSteps:
 
 
 @helper
-def _place_if_larger(t, total, f, run, g):
+def _place_if_larger(t, total, f, run, which):
     """The place for a state of a run with such a sum; -1 if it is not the largest of its part of time."""
-    if not total > f.slow[run, g]:
+    if not total > f.slow[run, which]:
         return -1
     part = (t - f.times[0]) * f.times[1]
     place = min(int(part), f.size.shape[2] - 1) if part > 0.0 else 0
-    if not total > f.size[run, g, place]:
+    if not total > f.size[run, which, place]:
         return -1
-    f.size[run, g, place] = total
+    f.size[run, which, place] = total
     return place
 
 
