@@ -73,7 +73,7 @@ def recursion(constants: Constants, workspace: Any) -> Problem:
 
 def kept_for_watches(system: System) -> StatesToKeep | None:
     """By which states at ends of steps the watches of accuracy look at a run; None if at none."""
-    if all(link.is_rigid for link in system.links):
+    if system.is_rigid:
         return None
     from flexmb.system.watches import states_to_keep  # imported here as many scenes have no flexible bodies
 
