@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from textwrap import fill
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from flexmb.advisor.bench import SAMPLES, Bench
-from flexmb.advisor.confirm import Confirmation, NoReference, Reference
+from flexmb.advisor.confirm import MOST, Confirmation, NoReference, Reference
 from flexmb.advisor.indicators import Indicators, indicators, of_level, predicted
 from flexmb.advisor.ladder import Cost, Step, cost, model_cost, references, rungs, softest, step
 from flexmb.advisor.methods import RunMethod
@@ -24,6 +25,7 @@ from flexmb.run.samples import refuse_large_run
 from flexmb.scene.bodies import BeamBody, Level, ModalBody
 from flexmb.scene.check import check_and_warn
 from flexmb.scene.open_loop import refuse_feedback
+from flexmb.scene.problems import SceneWarning
 from flexmb.scene.schema import Scene
 from flexmb.system.held_stretch import unstretchable
 from flexmb.tables import arguments
@@ -142,15 +144,23 @@ def advise(
     if not 0.0 < budget <= MOST_BUDGET:
         raise ValueError(f"the budget is {budget:g}: give a factor above 0, at most {MOST_BUDGET:g}")
     asked = prepare(scene, tolerance, quantity, t_end, budget)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SceneWarning)  # of candidates: those of the scene itself have been given
+        return _advice(scene, asked)
+
+
+def _advice(scene: Scene, asked: Prepared) -> Advice:
+    tolerance, budget, t_end = asked.tolerance, asked.budget, asked.bench.t_end
     advice = Advice(scene.name, t_end, tolerance, asked.bench.wanted, notes=asked.notes)
 
-    def refused(why: str, **more: Any) -> Advice:
-        return replace(advice, refusal=why, remedies=remedies(scene, asked.bench.wanted, tolerance, budget), **more)
+    def refused(why: str, needs: float, reached: float, **more: Any) -> Advice:
+        helpful = remedies(scene, asked.bench.wanted, tolerance, budget, needs / REFERENCE, reached)
+        return replace(advice, refusal=why, remedies=helpful, **more)
 
     try:
         confirmation = asked.confirmation()
     except NoReference as problem:
-        return refused(str(problem))
+        return refused(str(problem), problem.beyond, problem.reached / MOST)
     known, ladders, bench, notes = asked.known, asked.ladders, asked.bench, asked.notes
     found = search(ladders, confirmation, budget * BUDGET)
     if found is None and confirmation.refine():  # with a smaller uncertainty some may be adequate
@@ -159,7 +169,9 @@ def advise(
     trials = tuple(_trial(model, steps, confirmation) for model in confirmation.measured)
     if found is None:
         described = _described(confirmation.reference)
-        return refused(_none_adequate(trials, tolerance), trials=trials, reference=described)
+        best = min(trials, key=lambda trial: trial.measured)
+        why = _none_adequate(best, len(trials), tolerance)
+        return refused(why, confirmation.beyond, best.measured, trials=trials, reference=described)
     run = bench.run(found.model, found.method)
     if found.exhausted:
         notes += ("the search for cheaper models ended at its budget of operations",)
@@ -288,11 +300,10 @@ def _trial(model: Model, steps: dict[tuple[str, BodyModel], Step], confirmation:
     )
 
 
-def _none_adequate(trials: tuple[Trial, ...], tolerance: float) -> str:
-    best = min(trials, key=lambda trial: trial.measured)
+def _none_adequate(best: Trial, number: int, tolerance: float) -> str:
     names = ", ".join(f"{name}: {rung}" for name, rung in best.model)
     return (
-        f"no model of the ladder is within {tolerance:g}: the best of {len(trials)}, {names}, has the error "
+        f"no model of the ladder is within {tolerance:g}: the best of {number}, {names}, has the error "
         f"{best.measured:.2g}"
     )
 

@@ -44,7 +44,7 @@ _OVERHEAD = 4e8
 class BenchRun:
     """One run: its `signals` up to its end; `message`: why it stopped early, or ""; counted `operations` and measured
     `seconds` of the integration alone. `cut`: it was stopped at the allowed number of operations;
-    `reached`: the part of the output that it made."""
+    `reached`: the part of the output that it made; `accepted`: the part of its steps that were."""
 
     signals: Signals
     message: str
@@ -53,10 +53,17 @@ class BenchRun:
     seconds: float
     cut: bool = False
     reached: float = 0.0
+    accepted: float = 1.0
 
     @property
     def finished(self) -> bool:
         return not self.message
+
+    @property
+    def tighter(self) -> float:
+        """Operations that tighter tolerances or steps take at least: those of the whole run without its rejected
+        steps, of which a tolerance that is too loose for the scene has more than the next ones."""
+        return self.operations * self.accepted / self.reached if self.reached > 0.0 else np.inf
 
 
 class Bench:
@@ -135,6 +142,7 @@ class Bench:
             seconds=taken.run_s,
             cut=cut,
             reached=len(done.t) / len(self.times),
+            accepted=taken.accepted_steps / max(taken.accepted_steps + taken.rejected_steps, 1),
         )
 
 

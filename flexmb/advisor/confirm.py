@@ -56,7 +56,15 @@ References = tuple[tuple[str, Model], ...]
 
 
 class NoReference(ValueError):
-    """There is no reference with a small uncertainty; the message says why."""
+    """There is no reference with a small uncertainty; the message says why.
+
+    `beyond`: predicted operations of the next finer one that would cost too much, infinite if there is none; `reached`:
+    uncertainty of the finest that ran, infinite if it has none.
+    """
+
+    def __init__(self, message: str, beyond: float = np.inf, reached: float = np.inf) -> None:
+        super().__init__(message)
+        self.beyond, self.reached = beyond, reached
 
 
 @dataclass(frozen=True)
@@ -88,6 +96,7 @@ class Confirmation:
         self.measured: dict[Model, float] = {}
         self.references: list[Model] = []  # those that ran, from coarse to fine
         self.may_refine = False
+        self.beyond = np.inf  # predicted operations of the cheapest finer reference that would cost too much
         self.reference = self._reference(DEAR)
 
     @property
@@ -127,8 +136,7 @@ class Confirmation:
             return self._integrators[model]
         chosen, enough = EXPLICIT, 0.0
         expected = self._expected(model)
-        strains = any(rung.kind == "strains" for _, rung in model)
-        if strains and expected > CHEAP and not isinstance(self.bench.system(model), str):
+        if _by_strains(model) and expected > CHEAP and not isinstance(self.bench.system(model), str):
             enough = expected if expected <= self.budget else OVERCOUNTED * self.budget
             done = self.bench.run(model, self._finely(model, IMPLICIT), min(most, GLIMPSE * enough))
             if done.cut and done.reached > GLIMPSE / SLOW:
@@ -185,9 +193,9 @@ class Confirmation:
         `most` or more, any that does.
 
         In the ladder of every integrator, from loose to tight, it takes the first method that is accurate enough and
-        whose successor is, too; a single small error may be accidental. A ladder ends at a method that costs more than
-        the best one found, because tighter ones cost even more. The integrator of the fine run comes first, because it
-        is likely to be cheap, and then ends the runs of the others early.
+        whose successor is, too; a single small error may be accidental. A ladder ends at a method after which tighter
+        ones cost more than the best one found. The integrator of the fine run comes first, because it is likely to be
+        cheap, and then ends the runs of the others early.
         """
         room, fine = self.tolerance - self.error(model), self.finely(model)
         scene, algorithm = self.bench.scene, self.bench.algorithm(model)
@@ -207,15 +215,13 @@ class Confirmation:
                         best, least = before, self.bench.run(model, before).operations
                     break
                 done = self.bench.run(model, method, least if before is None else DEARER * least)
-                if done.cut:
-                    break
-                fits = self.integration_error(model, method) <= room
+                fits = not done.cut and self.integration_error(model, method) <= room
                 if fits and before is not None:
                     best, least = before, self.bench.run(model, before).operations
                     break
-                if done.finished and done.operations >= least:
+                if (done.cut or done.finished) and done.tighter >= least:
                     break
-                before = method if fits else None
+                before = method if fits and done.operations < least else None
         return best
 
     def _reference(self, dear: float) -> Reference:
@@ -225,16 +231,22 @@ class Confirmation:
         history: list[str] = []
         steps: list[float] = []
         last: Reference | None = None
-        self.references, self.may_refine = [], False
+        self.references, self.may_refine, self.beyond = [], False, np.inf
         for n, (name, model) in enumerate(known):
             most = MOST * self.tolerance
-            if last is not None and last.uncertainty > most and hopeless(steps, len(known) - n, most):
-                history.append("these differences fall too slowly for finer models to be run")
-                break
+            if last is not None and last.uncertainty > most and len(steps) > 1:
+                costs = [0.0 if _by_strains(each) else self._expected(each) for _, each in known[n:]]
+                affordable = sum(cost <= self.budget for cost in costs)
+                if affordable and hopeless(steps, affordable, most):
+                    dearer = [cost for i, cost in enumerate(costs) if not hopeless(steps, i + 1, most)]
+                    self.beyond = min(dearer, default=np.inf)
+                    history.append("these differences fall too slowly for finer models to be run")
+                    break
             if last is not None and last.uncertainty <= most and self._expected(model) > dear:
                 self.may_refine = True
                 break
             if last is not None and self._too_costly(model):
+                self.beyond = min(self.beyond, self._expected(model))
                 history.append(f"{name}: would cost too much")
                 continue
             system = self.bench.system(model)
@@ -259,12 +271,12 @@ class Confirmation:
                 return last
         if last is None:
             models = "the finest models of this scene do not run" if len(known) > 1 else "this does not run"
-            raise NoReference(f"{models} to the end: {'; '.join(history)}")
+            raise NoReference(f"{models} to the end: {'; '.join(history)}", self.beyond)
         if len(known) == 1:  # all bodies are rigid or raw, and have no finer model
             last = replace(last, uncertainty=hidden + self.drift)
         if last.uncertainty > MOST * self.tolerance:
             alone = [f"{last.name} alone can be run"] if np.isinf(last.uncertainty) else []
-            raise NoReference(self._unresolved(hidden, alone + history))
+            raise NoReference(self._unresolved(hidden, alone + history), self.beyond, last.uncertainty)
         return last
 
     def _refine(self, model: Model) -> None:
@@ -289,6 +301,11 @@ class Confirmation:
         if hidden > AGREED * self.tolerance:
             text += f"; the second-order deflection, which none of its models has, is estimated as {hidden:.2g}"
         return f"the finest models of this scene are not known to {self.tolerance:g} of the quantity: {text}"
+
+
+def _by_strains(model: Model) -> bool:
+    """Whether Radau 5 may make a run of the model that would cost DOP853 too much."""
+    return any(rung.kind == "strains" for _, rung in model)
 
 
 def hopeless(steps: Sequence[float], more: int, most: float) -> bool:

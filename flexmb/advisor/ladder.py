@@ -36,6 +36,8 @@ from flexmb.scene.strains import CURVATURES, polynomials
 
 EXACT_REFERENCES = ((1, 4), (1, 6), (1, 8), (2, 6), (4, 6), (8, 6))
 """Pieces, and polynomials of each curvature along one, of references for beams that bend far."""
+FINER_PIECES = (32, 64)
+"""Pieces of references beyond those of the ladder: what waves that jump demand, where they cost little."""
 SOFT = 0.05  # of the largest compliance
 STEP_AT_HIGHEST = 3.4
 """Step of DOP853 times the highest frequency when that frequency limits the step (measured)."""
@@ -155,9 +157,10 @@ def references(scene: Scene, bend_far: frozenset[str] = frozenset()) -> tuple[tu
         sizes = [(f"{p} pieces of {n}" if p > 1 else f"{n}", n, p) for p, n in EXACT_REFERENCES]
         return tuple((f"{size} polynomials", tuple((b.name, exact(b, n, p)) for b in bodies)) for size, n, p in sizes)
     first = tuple((b.name, rung(b, 0 if isinstance(b, BeamBody) and b.modes.static else 4, 0)) for b in bodies)
-    finer = [(f"{n} pieces", tuple((b.name, rung(b, 4, n)) for b in bodies)) for n in (2, 4, 8, 16)]
+    finer = [(f"{n} pieces", tuple((b.name, rung(b, 4, n)) for b in bodies)) for n in (*PIECES, *FINER_PIECES)]
     if not splits:
-        finer = [("still more modes", tuple((b.name, rung(b, 8, 0)) for b in bodies))]
+        sizes_of_modes = (("more modes", 4), ("still more modes", 8))
+        finer = [(name, tuple((b.name, rung(b, more, 0)) for b in bodies)) for name, more in sizes_of_modes]
     return (("modes" if bodies else "the scene", first), *((name, model) for name, model in finer if model != first))
 
 

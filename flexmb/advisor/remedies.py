@@ -17,15 +17,24 @@ from flexmb.scene.schema import Scene
 from flexmb.system.compile import compile
 from flexmb.tables.state import DynamicsError
 
+SAFE = 1.1  # a tolerance for which models suffice, over what they were seen to reach
 AT_REST = 1e-9  # acceleration in SI units that is rounding
 
 
-def remedies(scene: Scene, wanted: tuple[Quantity, ...], tolerance: float, budget: float) -> tuple[str, ...]:
-    """Sentences, those first that change the scene so that fewer modes are excited, or ring less long; one at least."""
-    return tuple(_remedies(scene, wanted, tolerance, budget))
+def remedies(
+    scene: Scene, wanted: tuple[Quantity, ...], tolerance: float, budget: float, needs: float, reached: float
+) -> tuple[str, ...]:
+    """Sentences, those first that change the scene so that fewer modes are excited, or ring less long; one at least.
+
+    `needs`: budget with which a finer model may run, infinite if there is none; `reached`: tolerance for which those
+    that ran suffice, infinite if none does.
+    """
+    return tuple(_remedies(scene, wanted, tolerance, budget, needs, reached))
 
 
-def _remedies(scene: Scene, wanted: tuple[Quantity, ...], tolerance: float, budget: float) -> Iterator[str]:
+def _remedies(
+    scene: Scene, wanted: tuple[Quantity, ...], tolerance: float, budget: float, needs: float, reached: float
+) -> Iterator[str]:
     if _jumps_at_the_start(scene):
         yield (
             "start from equilibrium (`fm.equilibrium`), or let loads and drives grow smoothly: this scene is let go "
@@ -37,10 +46,20 @@ def _remedies(scene: Scene, wanted: tuple[Quantity, ...], tolerance: float, budg
     undamped = [body.name for body in flexible_bodies(scene) if _rings(body)]
     if undamped:
         yield f"damping of {', '.join(undamped)}, whose modes ring to the end: `damping_ratio` or `viscosity_s`"
-    yield f"a longer budget, of {2.0 * budget:g} or more in place of {budget:g}, so that finer models may run"
+    if np.isfinite(needs):
+        yield f"a longer budget, of {_above(needs, 2):g} in place of {budget:g}, so that a finer model may run"
     loads = [str(each) for each in wanted if "load" in each.pattern or "drive" in each.pattern]
     of = f", or another quantity than {', '.join(loads)}, which high modes move more than a path" if loads else ""
-    yield f"a larger tolerance than {tolerance:g}, or a shorter time{of}"
+    such = f", such as {larger:g}," if (larger := _above(SAFE * reached, 1)) < 1.0 else ""
+    yield f"a larger tolerance than {tolerance:g}{such} or a shorter time{of}"
+
+
+def _above(value: float, digits: int) -> float:
+    """The least number of so many significant digits above a positive one."""
+    if not np.isfinite(value):
+        return value
+    unit = 10.0 ** (np.floor(np.log10(value)) + 1 - digits)
+    return float(np.ceil(value / unit) * unit)
 
 
 def _jumps_at_the_start(scene: Scene) -> bool:

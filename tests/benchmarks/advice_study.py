@@ -27,10 +27,9 @@ import numpy as np
 
 from crosscheck.library.find import shipped_cases
 from flexmb.advisor.advice import Advice, advise, prepare
-from flexmb.advisor.bench import MAX_STEPS
 from flexmb.advisor.confirm import Confirmation
 from flexmb.advisor.ladder import STAGES, Step, highest_frequency
-from flexmb.advisor.methods import FINEST, RunMethod, ladders, operations, simulated, simulated_within
+from flexmb.advisor.methods import FINEST, RunMethod, ladders, simulated
 from flexmb.advisor.models import EXACT, LEVELS, BodyModel, Model, built, flexible_bodies, levels
 from flexmb.advisor.modes import all_strains
 from flexmb.advisor.quantity import error, measured, scales
@@ -194,28 +193,20 @@ def cheapest_run(confirmation: Confirmation, model: Model, least: float) -> floa
     linearising = len(model) < 2 and not bench.scene.closures
     for ladder in ladders(highest, slow, bench.algorithm(model), linearising, float(bench.times[1])):
         for method, tighter in pairwise(ladder):
-            cost, fits = capped(confirmation, model, method, least)
-            if cost >= least:
-                break  # all the tighter ones take more
-            if fits and capped(confirmation, model, tighter, DEARER * least)[1]:
-                least = cost
+            if fits(confirmation, model, method, least) and fits(confirmation, model, tighter, DEARER * least):
+                least = bench.run(model, method).operations
+                break
+            done = bench.run(model, method, least)
+            if (done.cut or done.finished) and done.tighter >= least:
                 break
     return least
 
 
-def capped(confirmation: Confirmation, model: Model, method: RunMethod, most: float) -> tuple[float, bool]:
-    """Operations of a run that ends where it has executed `most`, and whether it is within the tolerance."""
-    bench, system = confirmation.bench, confirmation.bench.system(model)
-    each = bench.operations(model, method.algorithm)
-    done, cut = simulated_within(system, bench.times, method, each, most, MAX_STEPS)
-    if done is None or cut:
-        return most, False
-    if not done.finished:  # it may with tighter ones
-        return 0.0, False
-    reference = confirmation.reference
-    apart = error(measured(bench.wanted, done), reference.signals, reference.scale)
-    cost = operations(method, each, system.nq + system.nu + 1, done.statistics)
-    return cost, apart + reference.uncertainty <= confirmation.tolerance
+def fits(confirmation: Confirmation, model: Model, method: RunMethod, most: float) -> bool:
+    """Whether a run takes less than `most` operations and is within the tolerance."""
+    done = confirmation.bench.run(model, method, most)
+    cheap = done.finished and done.operations < most
+    return cheap and confirmation.total_error(model, method) <= confirmation.tolerance
 
 
 def choices(steps_of: dict[str, tuple[Step, ...]], chosen: Model) -> Iterator[Model]:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from msgspec.structs import replace
 
 import flexmb as fm
 from flexmb.advisor import advice as advice_module
-from flexmb.advisor.advice import advise
-from flexmb.advisor.confirm import NoReference, hopeless
+from flexmb.advisor.advice import advise, prepare
+from flexmb.advisor.confirm import Confirmation, NoReference, hopeless
+from flexmb.advisor.models import EXACT, BodyModel, built
 from flexmb.advisor.quantity import quantities
 from flexmb.advisor.remedies import remedies
 from tests.benchmarks.advice_questions import questions
@@ -17,8 +19,8 @@ from tests.flexmb.advisor.scenes import turned
 ASKED = {question.name: question for question in questions()}
 
 
-def of(scene: fm.Scene, word: str = "marker:*.position") -> str:
-    return "; ".join(remedies(scene, quantities(word, scene), 1e-2, 1.0))
+def of(scene: fm.Scene, word: str = "marker:*.position", needs: float = np.inf, reached: float = np.inf) -> str:
+    return "; ".join(remedies(scene, quantities(word, scene), 1e-2, 1.0, needs, reached))
 
 
 def test_every_refusal_names_what_helps_in_its_scene() -> None:
@@ -36,7 +38,15 @@ def test_nothing_is_advised_that_the_scene_has() -> None:
     (arm,) = scene.bodies
     assert isinstance(arm, fm.BeamBody)
     damped = replace(scene, bodies=(replace(arm, modes=replace(arm.modes, viscosity_s=1e-3)),))
-    assert "damping" not in of(damped) and "a longer budget, of 2 or more in place of 1" in of(damped)
+    assert "damping" not in of(damped)
+
+
+def test_budget_and_tolerance_that_would_do_are_named() -> None:
+    """No budget where no finer model waits for it."""
+    scene = turned(1.0, 0.6)
+    assert "budget" not in of(scene) and "such as" not in of(scene)
+    said = of(scene, needs=2.43, reached=0.0176)
+    assert "a longer budget, of 2.5 in place of 1" in said and "than 0.01, such as 0.02, or a shorter time" in said
 
 
 @pytest.mark.parametrize("doubt", ["references differ", "none adequate"])
@@ -48,7 +58,10 @@ def test_both_ways_to_refuse_have_remedies(monkeypatch: pytest.MonkeyPatch, doub
 
         monkeypatch.setattr(advice_module.Prepared, "confirmation", differ)
     else:
-        monkeypatch.setattr(advice_module, "search", lambda *given: None)
+        def nothing(ladders: object, known: Confirmation, budget: float) -> None:
+            known.error(known.reference.model)
+
+        monkeypatch.setattr(advice_module, "search", nothing)
         monkeypatch.setattr(advice_module, "_none_adequate", lambda *given: "none adequate")
     advice = advise(scene, 1e-2, t_end=0.2)
     assert advice.refusal == doubt and advice.remedies
@@ -66,14 +79,42 @@ def test_an_advice_reads_as_a_paragraph() -> None:
 
 
 def test_a_rod_that_only_stretches_is_answered() -> None:
-    """On d'Alembert's waves of a rod that a smooth force pulls; its first reference was 'no curvature among axial'."""
-    rod = ASKED["rod let go"].scene
-    pull = fm.SmoothStep(start_value=0.0, end_value=6.0, start_s=0.0, duration_s=0.3)
-    load = fm.Load(name="pull", body="strip", node="tip", type="force", direction=(1.0, 0.0, 0.0), function=pull)
-    scene = replace(rod, gravity_m_s2=(0.0, 0.0, 0.0), loads=(load,))
-    advice = advise(scene, 1e-2, t_end=0.3)
+    """On d'Alembert's waves of a rod that is let go: pieces converge slowly where strains jump, and cost little."""
+    question = ASKED["rod let go"]
+    advice = advise(question.scene, question.tolerance, question.quantity, question.t_end)
     assert advice.accepted, advice
-    assert "curvature" not in advice.reference and "curvature" not in str(advice.bodies[0].rung)
+    assert advice.reference.startswith("64 pieces") and "curvature" not in str(advice.bodies[0].rung)
+    times = np.linspace(0.0, question.t_end, 2001)
+    truth = question.truth(times)[0]
+    assert advice.scene is not None and advice.method is not None
+    tip = fm.simulate(advice.scene, times, **advice.method.options()).markers["tip"].position
+    off = np.linalg.norm(tip - truth, axis=1).max() / np.linalg.norm(truth - truth[0], axis=1).max()
+    assert off <= advice.measured <= question.tolerance
+
+
+def test_a_budget_is_named_where_references_wait_for_it() -> None:
+    """The one that is said lets the next finer one run."""
+    question = ASKED["rod let go"]
+    asked = prepare(question.scene, question.tolerance, question.quantity, question.t_end, 5e-3)
+    with pytest.raises(NoReference, match="64 pieces: would cost too much") as refused:
+        asked.confirmation()
+    assert refused.value.beyond == pytest.approx(3.6e8, rel=0.05) and refused.value.reached > 0.5 * asked.tolerance
+    budget = refused.value.beyond / advice_module.REFERENCE
+    asked = prepare(question.scene, question.tolerance, question.quantity, question.t_end, 1.01 * budget)
+    assert asked.confirmation().reference.name == "64 pieces"
+
+
+def test_warnings_are_of_the_scene_not_of_candidates(recwarn: pytest.WarningsRecorder) -> None:
+    """Of a quarter of a circle, rungs of few polynomials would warn."""
+    question = ASKED["quarter bow"]
+    asked = prepare(question.scene, question.tolerance, question.quantity, question.t_end)
+    few = built(question.scene, (("strip", BodyModel("strains", level=EXACT, pieces=1, polynomials=1)),))
+    with pytest.warns(fm.SceneWarning, match="make it too stiff"):
+        fm.compile(few)
+    assert asked.ladders["strip"]
+    recwarn.clear()
+    advise(question.scene, 5e-2, question.quantity, 0.1)
+    assert not recwarn.list
 
 
 def test_references_that_cannot_suffice_are_not_run() -> None:

@@ -170,3 +170,14 @@ def test_the_driven_crank_is_answered_within_tolerance() -> None:
     reference = measured(advice.quantities, truth)
     run = measured(advice.quantities, simulated(fm.compile(advice.scene), times, advice.method))
     assert error(run, reference, scales(advice.quantities, reference)) <= min(tolerance, 1.05 * advice.measured)
+
+
+def test_a_tolerance_that_is_too_loose_does_not_end_the_search_for_a_method() -> None:
+    """Dop853 rejects many steps of the slider-crank at a relative tolerance of 1e-2, and takes more operations than the
+    fine run; the next tighter one takes least."""
+    case = next(case for case in shipped_cases() if case.name == "closed_chains/slider_crank")
+    known = prepare(load_scene(case.folder / "scene.toml"), 1e-2, None, case.run.duration_s).confirmation()
+    methods = [RunMethod("dop853", rtol, known.bench.algorithm(())) for rtol in (1e-2, 1e-3, 1e-4)]
+    loose, best, _ = (known.bench.run((), method) for method in methods)
+    assert loose.operations > known.run(()).operations > best.operations and loose.tighter < loose.operations
+    assert known.cheapest_method(()) == methods[1]
