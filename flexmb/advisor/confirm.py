@@ -18,7 +18,7 @@ import numpy as np
 from flexmb.advisor.bench import Bench, BenchRun
 from flexmb.advisor.ladder import STAGES, Cost, highest_frequency, model_cost
 from flexmb.advisor.methods import FINEST, TOLERANCES, RunMethod, ladders
-from flexmb.advisor.models import Model
+from flexmb.advisor.models import Model, flexible_bodies, undamped
 from flexmb.advisor.quantity import Signals, error, scales
 from flexmb.integrate.catalogue import INTEGRATORS
 
@@ -91,6 +91,8 @@ class Confirmation:
         self.bench, self.tolerance, self.cost, self.budget = bench, tolerance, cost, budget
         self._hidden, self._known = hidden, known
         self._integrators: dict[Model, str] = {}
+        flexible = flexible_bodies(bench.scene)
+        self._damped = not bench.scene.constraints and not all(map(undamped, flexible))
         first = min(FINE * tolerance, LOOSEST)
         self._fine, self._drifts = {EXPLICIT: first, IMPLICIT: EASED * first}, dict[str, float]()
         self.measured: dict[Model, float] = {}
@@ -130,13 +132,13 @@ class Confirmation:
         return RunMethod(integrator, rtol, "articulated" if integrator == IMPLICIT else self.bench.algorithm(model))
 
     def _integrator(self, model: Model, most: float = np.inf) -> str:
-        """DOP853, or Radau 5 for strains if it takes fewer operations than the highest frequency demands of DOP853, or
-        if these exceed the budget and Radau 5 is within it."""
+        """DOP853, or Radau 5 for strains and trees with damping if it takes fewer operations than the highest frequency
+        demands of DOP853, or if these exceed the budget and Radau 5 is within it."""
         if model in self._integrators:
             return self._integrators[model]
         chosen, enough = EXPLICIT, 0.0
         expected = self._expected(model)
-        if _by_strains(model) and expected > CHEAP and not isinstance(self.bench.system(model), str):
+        if self._may_be_stiff(model) and expected > CHEAP and not isinstance(self.bench.system(model), str):
             enough = expected if expected <= self.budget else OVERCOUNTED * self.budget
             done = self.bench.run(model, self._finely(model, IMPLICIT), min(most, GLIMPSE * enough))
             if done.cut and done.reached > GLIMPSE / SLOW:
@@ -145,6 +147,10 @@ class Confirmation:
         if chosen == IMPLICIT or enough <= most:  # otherwise a longer run may still decide for Radau 5
             self._integrators[model] = chosen
         return chosen
+
+    def _may_be_stiff(self, model: Model) -> bool:
+        """Whether Radau 5 may make a run of the model that would cost DOP853 too much."""
+        return self._damped or any(rung.kind == "strains" for _, rung in model)
 
     def _too_costly(self, model: Model) -> bool:
         return self._integrator(model) == EXPLICIT and self._expected(model) > self.budget
@@ -235,7 +241,7 @@ class Confirmation:
         for n, (name, model) in enumerate(known):
             most = MOST * self.tolerance
             if last is not None and last.uncertainty > most and len(steps) > 1:
-                costs = [0.0 if _by_strains(each) else self._expected(each) for _, each in known[n:]]
+                costs = [0.0 if self._may_be_stiff(each) else self._expected(each) for _, each in known[n:]]
                 affordable = sum(cost <= self.budget for cost in costs)
                 if affordable and hopeless(steps, affordable, most):
                     dearer = [cost for i, cost in enumerate(costs) if not hopeless(steps, i + 1, most)]
@@ -301,11 +307,6 @@ class Confirmation:
         if hidden > AGREED * self.tolerance:
             text += f"; the second-order deflection, which none of its models has, is estimated as {hidden:.2g}"
         return f"the finest models of this scene are not known to {self.tolerance:g} of the quantity: {text}"
-
-
-def _by_strains(model: Model) -> bool:
-    """Whether Radau 5 may make a run of the model that would cost DOP853 too much."""
-    return any(rung.kind == "strains" for _, rung in model)
 
 
 def hopeless(steps: Sequence[float], more: int, most: float) -> bool:

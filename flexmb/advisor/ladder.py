@@ -50,7 +50,7 @@ sqrt(EI / (m L^4)), ZIGZAG = sqrt(48)."""
 @dataclass(frozen=True)
 class Step:
     """A rung with its predictions: error relative to the scale, operations that the body adds to one evaluation,
-    highest frequency (rad/s)."""
+    highest frequency (rad/s), or fastest decay (1/s) where damping makes that the faster."""
 
     rung: BodyModel
     error: float
@@ -183,7 +183,7 @@ def step(scene: Scene, name: str, rung: BodyModel, error: float) -> Step | None:
         whole = built(scene, ((name, rung),))
         before = {b.name for b in scene.bodies if b.name != name}
         parts = [b for b in whole.bodies if b.name not in before]
-        counts = [(len(_squares(b)), b.level) for b in parts]
+        counts = [(len(_squares(b)[0]), b.level) for b in parts]
         fastest = _fastest(next(b for b in scene.bodies if b.name == name), rung, parts)
     except ValueError:
         return None
@@ -204,33 +204,43 @@ def model_cost(scene: Scene, model: Model, known: Cost) -> float:
 
 
 def highest_frequency(scene: Scene, model: Model) -> float:
-    """Highest frequency (rad/s) of any body with its base fixed; 0 if all are rigid."""
+    """Highest frequency (rad/s) or fastest decay (1/s) of any body with its base fixed; 0 if all are rigid."""
     steps = [step(scene, name, rung, 0.0) for name, rung in model]
     return max((each.fastest for each in steps if each), default=0.0)
 
 
 def _fastest(body: Body, rung: BodyModel, parts: list[Body]) -> float:
-    """Highest frequency (rad/s) of the bodies that replace one body in a rung."""
+    """Highest frequency (rad/s), or fastest decay, of the bodies that replace one body in a rung."""
     if rung.kind == "segments" and isinstance(body, BeamBody):
-        return ZIGZAG * rung.pieces**2 * _beam_rate(body)
-    return max(float(np.sqrt(max(_squares(part), default=0.0))) for part in parts)
+        frequency = ZIGZAG * rung.pieces**2 * _beam_rate(body)
+        return _rate(frequency, body.modes.viscosity_s * frequency**2)
+    return max(_rate(float(np.sqrt(max(squares, default=0.0))), decay) for squares, decay in map(_squares, parts))
 
 
-def _squares(body: Body) -> tuple[float, ...]:
-    """Squares of the frequencies of a body with its base fixed, none if it is rigid; cached for any name."""
+def _rate(frequency: float, decay: float) -> float:
+    """The larger root (1/s, magnitude) of x² - decay x + frequency² = 0, a mode that creeps back, or the frequency
+    (rad/s) of one that swings."""
+    half = 0.5 * decay
+    return frequency if half <= frequency else half + float(np.sqrt(half**2 - frequency**2))
+
+
+def _squares(body: Body) -> tuple[tuple[float, ...], float]:
+    """Squares of the frequencies of a body with its base fixed, and the largest damping over mass (1/s); none and 0 if
+    it is rigid. Cached for any name."""
     if not isinstance(body, BeamBody | ModalBody) or body.level == "rigid":
-        return ()
+        return (), 0.0
     return _squares_of(replace(body, name="body", level=EXACT if body.level == EXACT else "full"))
 
 
 @lru_cache(maxsize=4096)
-def _squares_of(body: BeamBody | ModalBody) -> tuple[float, ...]:
+def _squares_of(body: BeamBody | ModalBody) -> tuple[tuple[float, ...], float]:
     model = flexible_model(body)
     m = model.mode_count
     if m == 0:
-        return ()
+        return (), 0.0
     mass = modal_integrals(model).spatial_mass[:m, :m]
-    return tuple(eigvalsh(model.stiffness, mass).tolist())
+    decay = float(eigvalsh(model.damping, mass).max()) if np.any(model.damping) else 0.0
+    return tuple(eigvalsh(model.stiffness, mass).tolist()), decay
 
 
 def _beam_rate(beam: BeamBody) -> float:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, assert_never
 
+import numpy as np
 from msgspec.structs import replace
 
 from flexmb.advisor.modes import with_modes, with_strains
@@ -81,6 +82,13 @@ Model = tuple[tuple[str, BodyModel], ...]
 def flexible_bodies(scene: Scene) -> tuple[BeamBody | ModalBody, ...]:
     """Bodies with modes whose level is not "rigid"."""
     return tuple(b for b in scene.bodies if isinstance(b, BeamBody | ModalBody) and b.level != "rigid")
+
+
+def undamped(body: BeamBody | ModalBody) -> bool:
+    """Whether a body has no damping of its own."""
+    if isinstance(body, ModalBody):
+        return not np.any(np.array(body.damping))
+    return not np.any(body.modes.damping_ratio) and body.modes.viscosity_s == 0.0
 
 
 def levels(body: BeamBody | ModalBody) -> tuple[Level, ...]:

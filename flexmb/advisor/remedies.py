@@ -6,10 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from flexmb.advisor.models import flexible_bodies
+from flexmb.advisor.models import flexible_bodies, undamped
 from flexmb.advisor.quantity import Quantity
 from flexmb.closure.closures import ClosureError
-from flexmb.scene.bodies import BeamBody, ModalBody
 from flexmb.scene.check.walk import values
 from flexmb.scene.convert import ROOT
 from flexmb.scene.functions import Pulse
@@ -43,9 +42,9 @@ def _remedies(
     pulses = [str(place) for place, _, value in values(ROOT, scene) if isinstance(value, Pulse)]
     if pulses:
         yield f"a smoother pulse, of two smooth steps, in place of that of {', '.join(pulses)}, which jumps"
-    undamped = [body.name for body in flexible_bodies(scene) if _rings(body)]
-    if undamped:
-        yield f"damping of {', '.join(undamped)}, whose modes ring to the end: `damping_ratio` or `viscosity_s`"
+    ringing = [body.name for body in flexible_bodies(scene) if undamped(body)]
+    if ringing:
+        yield f"damping of {', '.join(ringing)}, whose modes ring to the end: `damping_ratio` or `viscosity_s`"
     if np.isfinite(needs):
         yield f"a longer budget, of {_above(needs, 2):g} in place of {budget:g}, so that a finer model may run"
     loads = [str(each) for each in wanted if "load" in each.pattern or "drive" in each.pattern]
@@ -71,10 +70,3 @@ def _jumps_at_the_start(scene: Scene) -> bool:
     except (ClosureError, DynamicsError, ValueError, NotImplementedError):
         return False
     return not np.any(start.u) and bool(np.any(np.abs(first) > AT_REST))
-
-
-def _rings(body: BeamBody | ModalBody) -> bool:
-    """Whether a body has no damping of its own."""
-    if isinstance(body, ModalBody):
-        return not np.any(np.array(body.damping))
-    return not np.any(body.modes.damping_ratio) and body.modes.viscosity_s == 0.0
