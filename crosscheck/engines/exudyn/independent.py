@@ -6,14 +6,11 @@ only what nothing suppresses before them, which leaves the motion as it is, and 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-from typing import Any
-
 import numpy as np
 
 from crosscheck.engines.exudyn.assembly import Assembly, assemble
 from crosscheck.engines.exudyn.joints import CONSTRAINED
+from crosscheck.engines.exudyn.library import constraint_jacobian, evaluator
 from crosscheck.engines.exudyn.state import States
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
@@ -45,7 +42,7 @@ def opening(whole: Assembly, states: States) -> tuple[int, str]:
     """The first sample at which a whole closure is open, and its name; the number of samples and "" if none is."""
     data = whole.shop.mbs.systemData
     rows = {name: list(data.GetObjectLTGAE(link.connectors[0][0])) for name, link in whole.closures.items()}
-    with _solver(whole) as (solver, n):
+    with evaluator(whole.shop.mbs) as (solver, n):
         for sample in range(len(states.times)):
             data.SetODE2Coordinates(states.q[sample])
             data.SetODE2Coordinates_t(states.v[sample])
@@ -72,21 +69,6 @@ def _rows(assembly: Assembly) -> int:
 
 def _jacobian(assembly: Assembly) -> Real:
     """(k, n) of all constraints where the run begins."""
-    with _solver(assembly) as (solver, n):
-        k = solver.GetAEsize()
-        solver.SetSystemJacobian(np.zeros((n + k, n + k)))
-        solver.ComputeJacobianAE(assembly.shop.mbs, velocityLevel=False)
-        return np.array(solver.GetSystemJacobian())[n:, :n]
-
-
-@contextmanager
-def _solver(assembly: Assembly) -> Iterator[tuple[Any, int]]:
-    """Exudyn's solver at the initial state, for single evaluations, and the number of coordinates."""
-    exu, mbs = assembly.shop.exu, assembly.shop.mbs
-    settings = exu.SimulationSettings()
-    settings.solution.file.write = False
-    settings.timeIntegration.verboseMode = 0
-    solver = exu.MainSolverImplicitSecondOrder()
-    solver.InitializeSolver(mbs, settings)
-    yield solver, len(mbs.systemData.GetODE2Coordinates())
-    solver.FinalizeSolver(mbs, settings)
+    mbs = assembly.shop.mbs
+    with evaluator(mbs) as (solver, n):
+        return constraint_jacobian(mbs, solver, n)

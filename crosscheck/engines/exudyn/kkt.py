@@ -9,6 +9,7 @@ import numpy as np
 
 from crosscheck.engines.exudyn.assembly import Assembly
 from crosscheck.engines.exudyn.beams import PlanarBeam
+from crosscheck.engines.exudyn.library import constraint_jacobian, evaluator
 from crosscheck.engines.exudyn.rotations import local_rate_map
 from crosscheck.engines.exudyn.state import States
 from flexmb.typing import Real
@@ -26,40 +27,33 @@ def initial_state(assembly: Assembly | PlanarBeam) -> States:
 
     C is the Jacobian of Exudyn's constraints, o the prescribed coordinates.
     """
-    exu, mbs = assembly.shop.exu, assembly.shop.mbs
-    settings = exu.SimulationSettings()
-    settings.solution.file.write = False
-    settings.timeIntegration.verboseMode = 0
-    solver = exu.MainSolverImplicitSecondOrder()
-    solver.InitializeSolver(mbs, settings)
+    mbs = assembly.shop.mbs
     data = mbs.systemData
-    q, v = np.array(data.GetODE2Coordinates()), np.array(data.GetODE2Coordinates_t())
-    n, k = len(q), solver.GetAEsize()
-    if k:
-        data.SetAECoordinates(np.zeros(k))
-    solver.ComputeMassMatrix(mbs)
-    M = np.array(solver.GetSystemMassMatrix())[:n, :n]
-    solver.ComputeODE2RHS(mbs)
-    f = np.array(solver.GetSystemResidual())[:n]
+    with evaluator(mbs) as (solver, n):
+        q, v = np.array(data.GetODE2Coordinates()), np.array(data.GetODE2Coordinates_t())
+        k = solver.GetAEsize()
+        if k:
+            data.SetAECoordinates(np.zeros(k))
+        solver.ComputeMassMatrix(mbs)
+        M = np.array(solver.GetSystemMassMatrix())[:n, :n]
+        solver.ComputeODE2RHS(mbs)
+        f = np.array(solver.GetSystemResidual())[:n]
 
-    def jacobian(at: Real) -> Real:
-        data.SetODE2Coordinates(at)
-        solver.SetSystemJacobian(np.zeros((n + k, n + k)))
-        solver.ComputeJacobianAE(mbs, velocityLevel=False)
-        return np.array(solver.GetSystemJacobian())[n:, :n]
+        def jacobian(at: Real) -> Real:
+            data.SetODE2Coordinates(at)
+            return constraint_jacobian(mbs, solver, n)
 
-    a, multipliers = np.linalg.solve(M, f) if not k else None, np.zeros(k)
-    if k:
-        C = jacobian(q)
-        dt = _DISTANCE / max(1.0, np.abs(v).max())
-        near, far = (jacobian(q + h * v) - jacobian(q - h * v) for h in (dt, 2.0 * dt))
-        rate = (8.0 * near - far) / (12.0 * dt)
-        data.SetODE2Coordinates(q)
-        right = -rate @ v + _prescribed_accelerations(assembly, k)
-        system = np.block([[M, C.T], [C, np.zeros((k, k))]])
-        solution = np.linalg.lstsq(system, np.concatenate([f, right]), rcond=1e-14)[0]
-        a, multipliers = solution[:n], solution[n:]
-    solver.FinalizeSolver(mbs, settings)
+        a, multipliers = np.linalg.solve(M, f) if not k else None, np.zeros(k)
+        if k:
+            C = jacobian(q)
+            dt = _DISTANCE / max(1.0, np.abs(v).max())
+            near, far = (jacobian(q + h * v) - jacobian(q - h * v) for h in (dt, 2.0 * dt))
+            rate = (8.0 * near - far) / (12.0 * dt)
+            data.SetODE2Coordinates(q)
+            right = -rate @ v + _prescribed_accelerations(assembly, k)
+            system = np.block([[M, C.T], [C, np.zeros((k, k))]])
+            solution = np.linalg.lstsq(system, np.concatenate([f, right]), rcond=1e-14)[0]
+            a, multipliers = solution[:n], solution[n:]
     stored = np.array(data.GetDataCoordinates())
     return States(np.zeros(1), q[None], v[None], a[None], multipliers[None], stored[None])
 

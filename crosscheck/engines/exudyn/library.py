@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from importlib.metadata import PackageNotFoundError
 from importlib.metadata import version as installed_version
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 
@@ -42,3 +45,27 @@ def matrix(values: Real):
     container = load().MatrixContainer()
     container.SetWithDenseMatrix(np.asarray(values, dtype=float), useDenseMatrix=True)
     return container
+
+
+@contextmanager
+def evaluator(mbs: Any) -> Iterator[tuple[Any, int]]:
+    """Exudyn's implicit solver at the initial state of a system, for single evaluations of its equations, and the number
+    of its coordinates; the solver is finalised whatever happens."""
+    exudyn = load()
+    settings = exudyn.SimulationSettings()
+    settings.solution.file.write = False
+    settings.timeIntegration.verboseMode = 0
+    solver = exudyn.MainSolverImplicitSecondOrder()
+    solver.InitializeSolver(mbs, settings)
+    try:
+        yield solver, len(mbs.systemData.GetODE2Coordinates())
+    finally:
+        solver.FinalizeSolver(mbs, settings)
+
+
+def constraint_jacobian(mbs: Any, solver: Any, n: int) -> Real:
+    """(k,n) derivatives of all constraints by the n coordinates, at the current ones."""
+    size = n + solver.GetAEsize()
+    solver.SetSystemJacobian(np.zeros((size, size)))
+    solver.ComputeJacobianAE(mbs, velocityLevel=False)
+    return np.array(solver.GetSystemJacobian())[n:, :n]

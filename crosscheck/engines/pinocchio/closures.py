@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import pinocchio as pin
 
-from crosscheck.engines.conventions import cross
 from crosscheck.engines.links import closed_frames
+from crosscheck.engines.pinocchio.forces import ClosedLoad, on_joints
 from crosscheck.engines.pinocchio.tree import PinocchioTree, placement
 from flexmb.scene.schema import Closure, Scene
 from flexmb.typing import Real
@@ -57,27 +57,17 @@ class PinocchioClosures:
 
     def loads(self) -> dict[str, Real]:
         """[torque; force] (6,) on body_b about frame B, World axes, of the state solved last."""
-        return {name: np.concatenate(load) for name, (load, _) in zip(self._names, self._in_world(), strict=True)}
+        return {name: load.wrench for name, load in zip(self._names, self._closed(), strict=True)}
 
     def on_joints(self) -> pin.StdVec_Force:
         """The same as wrenches on both sides' joints, in joint axes about the joint origin."""
-        total = pin.StdVec_Force()
-        total.extend([pin.Force.Zero() for _ in range(self._model.njoints)])
-        for (load, point), sides in zip(self._in_world(), self._sides, strict=True):
-            for joint, sign in zip(sides, (-1.0, 1.0), strict=True):
-                if joint == 0:
-                    continue
-                pose = self._data.oMi[joint]
-                torque, force = sign * load[0], sign * load[1]
-                torque = torque + cross(point - pose.translation, force)
-                total[joint] = total[joint] + pin.Force(pose.rotation.T @ force, pose.rotation.T @ torque)
-        return total
+        return on_joints(self._model, self._data, self._closed())
 
-    def _in_world(self) -> list[tuple[tuple[Real, Real], Real]]:
-        """By closure (torque, force) on B, and where B is; Pinocchio's force is that on A, in its axes."""
+    def _closed(self) -> list[ClosedLoad]:
+        """By closure; Pinocchio's force is that on A, in its axes."""
         loads = []
-        for each in self._found:
+        for each, sides in zip(self._found, self._sides, strict=True):
             R = each.oMc1.rotation
-            load = (-R @ each.contact_force.angular, -R @ each.contact_force.linear)
-            loads.append((load, each.oMc2.translation.copy()))
+            wrench = -np.concatenate([R @ each.contact_force.angular, R @ each.contact_force.linear])
+            loads.append(ClosedLoad(wrench, each.oMc2.translation.copy(), sides))
         return loads

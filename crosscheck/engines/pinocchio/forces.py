@@ -1,21 +1,19 @@
-"""Loads on a Pinocchio tree: at nodes, of connectors and of couplings of coordinates.
-
-They are wrenches on joints, in joint axes, and efforts along coordinates; those of couplings follow from the mass
-matrix.
-"""
+"""Loads on a Pinocchio tree, at nodes, of connectors and of closures, as wrenches on joints in joint axes, and efforts
+along coordinates."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from crosscheck.engines.connections import WORLD, Along, Exerted, Moving
-from crosscheck.engines.conventions import cross
+from crosscheck.engines.conventions import cross, shift_wrench
 from crosscheck.engines.links import Attachment
 from crosscheck.engines.pinocchio.tree import PinocchioTree
-from crosscheck.engines.rigid_tree import PointLoad, TreeConnectors, placed_couplings, placed_loads
+from crosscheck.engines.rigid_tree import PointLoad, TreeConnectors, placed_loads
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -111,37 +109,25 @@ class PinocchioConnections:
         return Moving(pose.translation, R, R @ speed.angular, R @ speed.linear).carrying(at.frame)
 
 
-class PinocchioCouplings:
-    """The couplings of a scene on its tree. `efforts` leaves their loads for `loads`."""
+class ClosedLoad(NamedTuple):
+    """The load of a closure: `wrench` [torque; force] (6,) on B about `place` (3,) m, both in World axes, and the joints
+    of A and B, 0 for World."""
 
-    def __init__(self, tree: PinocchioTree, scene: Scene, driven: list[int]) -> None:
-        """`driven`: speeds whose accelerations are given."""
-        self._placed, nv = placed_couplings(scene, tree.slots), tree.model.nv
-        at = {slot.v: joint for joint, slot in enumerate(tree.slots, 1)}  # the joint of World comes first
-        self._joints = [at[each.slots[0].v] for each in self._placed]
-        self._model, self._data = tree.model, tree.model.createData()
-        self._J = np.array([each.row(nv) for each in self._placed]).reshape(-1, nv)
-        self._free = np.setdiff1d(np.arange(nv), driven)
-        self._load = np.zeros(len(self._placed))
+    wrench: Real
+    place: Real
+    sides: tuple[int, int]
 
-    def __bool__(self) -> bool:
-        return bool(self._placed)
 
-    def efforts(self, q: Real, accelerations: Real) -> Real:
-        """(nv,) generalised forces that keep the relations, from the accelerations (nv,) without them.
-
-        J M^-1 J' f = -J a with the mass matrix of the free speeds; the least f where couplings are redundant.
-        """
-        M = pin.crba(self._model, self._data, q)
-        M = np.triu(M) + np.triu(M, 1).T
-        J = self._J[:, self._free]
-        response = np.linalg.solve(M[np.ix_(self._free, self._free)], J.T)
-        self._load = -np.linalg.lstsq(J @ response, self._J @ accelerations, rcond=1e-12)[0]
-        return self._J.T @ self._load
-
-    def loads(self, data: pin.Data) -> dict[str, Real]:
-        """[torque; force] (6,) by coupling along the axis of what it leads, World axes, of the state solved last."""
-        return {
-            each.name: each.load(size, data.oMi[joint].rotation @ each.slots[0].freedom.axis)
-            for each, joint, size in zip(self._placed, self._joints, self._load.tolist(), strict=True)
-        }
+def on_joints(model: pin.Model, data: pin.Data, loads: Iterable[ClosedLoad]) -> pin.StdVec_Force:
+    """Loads of closures as wrenches on both sides' joints, in joint axes about the joint origin; `data` has the places
+    of the joints."""
+    total = pin.StdVec_Force()
+    total.extend([pin.Force.Zero() for _ in range(model.njoints)])
+    for load in loads:
+        for joint, sign in zip(load.sides, (-1.0, 1.0), strict=True):
+            if joint == 0:
+                continue
+            pose = data.oMi[joint]
+            torque, force = shift_wrench(sign * load.wrench, load.place - pose.translation).reshape(2, 3)
+            total[joint] = total[joint] + pin.Force(pose.rotation.T @ force, pose.rotation.T @ torque)
+    return total

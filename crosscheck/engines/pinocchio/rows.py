@@ -14,6 +14,7 @@ import pinocchio as pin
 
 from crosscheck.engines.conventions import Frame, axes_with, cross
 from crosscheck.engines.links import closed_frames
+from crosscheck.engines.pinocchio.forces import ClosedLoad, on_joints
 from crosscheck.engines.pinocchio.tree import PinocchioTree
 from crosscheck.engines.rigid_tree import TreeState, placed_couplings
 from flexmb.scene.hinges import WITH_AXIS, Closure, ClosureKind
@@ -31,7 +32,9 @@ _KEPT: dict[ClosureKind, tuple[tuple[tuple[int, int], ...], tuple[int, ...]]] = 
     "spherical": ((), _EVERY),
 }
 """Which axes of A and B a closure keeps at right angles, and along which axes of A it keeps B at A; z is its axis."""
-DEPENDENT = 1e-12
+DEPENDENT = 1e-9
+"""Singular values that count as zero, of rows scaled to length one in the metric of the mass matrix, whatever their
+units: those of redundant rows are the gap of the closures, which begin closed to 1e-12, and rounding."""
 
 
 class _End(NamedTuple):
@@ -73,14 +76,19 @@ class PinocchioRows:
     def efforts(self, state: TreeState, accelerations: Real) -> Real:
         """(nv,) generalised forces that keep what is kept, from the accelerations (nv,) without them.
 
-        J M^-1 J' f = -(J a + dJ/dt v) with the mass matrix of the free speeds; the least f where rows are redundant.
+        J M^-1 J' f = -(J a + dJ/dt v) with the mass matrix M of the free speeds. With M = L L' and W = L^-1 J', whose
+        columns scaled to length one are U S V', the loads are f = -V S^-2 V' (J a + dJ/dt v) but for these scales; where
+        rows are redundant, they are the least such ones.
         """
         M = pin.crba(self._model, self._data, state.q)
         M = np.triu(M) + np.triu(M, 1).T
         J, opening, directions = self._rows(state, accelerations)
-        part = J[:, self._free]
-        response = np.linalg.solve(M[np.ix_(self._free, self._free)], part.T)
-        load = -np.linalg.lstsq(part @ response, opening, rcond=DEPENDENT)[0]
+        W = np.linalg.solve(np.linalg.cholesky(M[np.ix_(self._free, self._free)]), J[:, self._free].T)
+        lengths = np.linalg.norm(W, axis=0)
+        lengths[lengths == 0.0] = 1.0
+        _, sizes, V = np.linalg.svd(W / lengths, full_matrices=False)
+        sizes, V = sizes[kept := sizes > DEPENDENT], V[kept]
+        load = -(V.T @ (V @ (opening / lengths) / sizes**2)) / lengths
         self._load, first = load[: len(self._couplings)], len(self._couplings)
         for name, (along, position) in directions.items():
             self._wrench[name] = along @ load[first : first + along.shape[1]], position
@@ -98,17 +106,9 @@ class PinocchioRows:
 
     def on_joints(self) -> pin.StdVec_Force:
         """Those of closures as wrenches on both sides' joints, in joint axes about the joint origin."""
-        total = pin.StdVec_Force()
-        total.extend([pin.Force.Zero() for _ in range(self._model.njoints)])
-        for name, (load, point) in self._wrench.items():
-            for end, sign in zip(self._closures[name][1], (-1.0, 1.0), strict=True):
-                if end.joint == 0:
-                    continue
-                pose = self._data.oMi[end.joint]
-                torque, force = sign * load[:3], sign * load[3:]
-                torque = torque + cross(point - pose.translation, force)
-                total[end.joint] = total[end.joint] + pin.Force(pose.rotation.T @ force, pose.rotation.T @ torque)
-        return total
+        closed = ((*found, self._closures[name][1]) for name, found in self._wrench.items())
+        loads = (ClosedLoad(load, place, (a.joint, b.joint)) for load, place, (a, b) in closed)
+        return on_joints(self._model, self._data, loads)
 
     def _rows(self, state: TreeState, accelerations: Real) -> tuple[Real, Real, dict[str, tuple[Real, Real]]]:
         """J (G, nv) of couplings, then closures, their accelerations (G,), and for each closure [torque; force] (6, n)
