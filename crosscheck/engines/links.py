@@ -189,6 +189,23 @@ def attachment(scene: Scene, chain: tuple[Link, ...], item: Marker | Load) -> At
     return Attachment(index, chain[index].body @ offset_frame(body, item.node, offset))
 
 
+def is_bare_frame(link: Link) -> bool:
+    """Whether a link is welded to what carries it and has no inertia, as most robots have a base and a tool."""
+    return not link.freedoms and link.inertia.mass == 0.0 and not np.any(link.inertia.inertia)
+
+
+def radius_of_gyration(chain: tuple[Link, ...], at: Attachment) -> float:
+    """m, of a link about a frame on it; that of the link which carries it for a frame without inertia, 0 for World."""
+    index, place = at.link, at.frame
+    while index >= 0 and is_bare_frame(chain[index]):
+        index, place = chain[index].parent, chain[index].inboard @ place
+    if index < 0 or chain[index].inertia.mass == 0.0:
+        return 0.0
+    own = chain[index].inertia
+    arm = own.com - place.position
+    return float(np.sqrt(0.5 * np.trace(own.inertia) / own.mass + arm @ arm))
+
+
 def closed_frames(
     scene: Scene, chain: tuple[Link, ...], item: Closure | BetweenNodes
 ) -> tuple[Attachment, Attachment]:

@@ -59,8 +59,3 @@ def inertia_obstacle(links: Iterable[Link], engine: str) -> str:
         if a < -ROUND_OFF * c or a + b < c * (1.0 - ROUND_OFF):
             return f'{engine} refuses the inertia of "{link.name}": principal moments {a:g}, {b:g}, {c:g} kg m^2'
     return ""
-
-
-def is_bare_frame(link: Link) -> bool:
-    """Whether a link is welded to what carries it and has no inertia, as most robots have a base and a tool."""
-    return not link.freedoms and link.inertia.mass == 0.0 and not np.any(link.inertia.inertia)

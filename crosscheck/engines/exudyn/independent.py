@@ -12,14 +12,15 @@ from crosscheck.engines.exudyn.assembly import Assembly, assemble
 from crosscheck.engines.exudyn.joints import CONSTRAINED
 from crosscheck.engines.exudyn.library import constraint_jacobian, evaluator
 from crosscheck.engines.exudyn.state import States
+from crosscheck.engines.links import closed_frames, links, radius_of_gyration
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
 DEPENDENT = 1e-9
 """Singular values of normalised rows that count as zero: loops begin closed to 1e-12 or less."""
 OPENED = 1e-3
-"""How far (m, or sine of an angle) what is left out may open in a run: at an exceptional position of the start, rows
-seem redundant that are not."""
+"""How far what is left out may open in a run, as sine of an angle or by the larger radius of gyration of the two bodies
+about the closure: at an exceptional position of the start, rows seem redundant that are not."""
 
 
 def independent(scene: Scene) -> tuple[Assembly, Assembly | None]:
@@ -40,7 +41,11 @@ def independent(scene: Scene) -> tuple[Assembly, Assembly | None]:
 
 def opening(whole: Assembly, states: States) -> tuple[int, str]:
     """The first sample at which a whole closure is open, and its name; the number of samples and "" if none is."""
-    data = whole.shop.mbs.systemData
+    data, chain = whole.shop.mbs.systemData, links(whole.scene)
+    sizes = {
+        each.name: max(radius_of_gyration(chain, at) for at in closed_frames(whole.scene, chain, each))
+        for each in whole.scene.closures
+    }
     rows = {name: list(data.GetObjectLTGAE(link.connectors[0][0])) for name, link in whole.closures.items()}
     with evaluator(whole.shop.mbs) as (solver, n):
         for sample in range(len(states.times)):
@@ -48,8 +53,8 @@ def opening(whole: Assembly, states: States) -> tuple[int, str]:
             data.SetODE2Coordinates_t(states.v[sample])
             solver.ComputeAlgebraicEquations(whole.shop.mbs, False)
             gap = np.abs(np.array(solver.GetSystemResidual())[n:])
-            for name, own in rows.items():
-                if not np.max(gap[own]) <= OPENED:
+            for name, own in rows.items():  # of every joint the first three are displacements
+                if not (np.max(gap[own[:3]]) <= OPENED * sizes[name] and np.max(gap[own[3:]], initial=0.0) <= OPENED):
                     return sample, name
     return len(states.times), ""
 

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from crosscheck.engines.connections import KNOWN
 from crosscheck.engines.contract import Effort, Model, Support
-from crosscheck.engines.links import links, obstacle
+from crosscheck.engines.links import is_bare_frame, links, obstacle
 from crosscheck.engines.pace import pace
-from crosscheck.engines.peer import PeerEngine, inertia_obstacle, is_bare_frame, needed
+from crosscheck.engines.peer import PeerEngine, inertia_obstacle, needed
 from crosscheck.engines.steps import USUAL_S, ladder
 from flexmb.scene.schema import Scene
 
 _RUNGS = 4
 _SOFT = (
-    "closures and couplings are springs and dampers (its defaults): loops open by 1e-4 to 1e-3 of their size under load"
+    "closures and couplings are springs and dampers (its defaults): loops open by 1e-4 to 1e-3 of their size under load, "
+    "and near a stiff position loads may be off by their size"
 )
 
 
@@ -35,7 +36,7 @@ class MujocoEngine(PeerEngine):
         return mujoco.__version__
 
     def obstacle(self, scene: Scene) -> str:
-        reason = obstacle(scene, "MuJoCo", ("spherical", "revolute"), KNOWN, couplings=True, armatures=True)
+        reason = obstacle(scene, "MuJoCo", ("spherical", "revolute", "weld"), KNOWN, couplings=True, armatures=True)
         return reason or inertia_obstacle((each for each in links(scene) if not is_bare_frame(each)), "MuJoCo")
 
     def supports(self, scene: Scene) -> Support:

@@ -14,17 +14,16 @@ import numpy as np
 from crosscheck.engines.contract import Effort, Run, Snapshot, Trajectory
 from crosscheck.engines.functions_of_time import breaks_between, scene_functions
 from crosscheck.engines.linear.outputs import outputs
-from crosscheck.engines.links import Link, Scalar, closed_frames, links
+from crosscheck.engines.links import Link, Scalar, links
 from crosscheck.engines.mujoco.forces import Forces
 from crosscheck.engines.mujoco.linear import linearised
 from crosscheck.engines.mujoco.observer import MujocoObserver
 from crosscheck.engines.mujoco.tree import (
-    MujocoClosure,
     MujocoCoupling,
     build_tree,
     initial_state,
-    joined_points,
     joint_name,
+    mujoco_closure,
 )
 from crosscheck.engines.trajectories import stack
 from flexmb.scene.schema import Scene
@@ -42,9 +41,7 @@ _INTEGRATORS = {  # method of an effort: MuJoCo's constant, evaluations per step
 class MujocoModel:
     def __init__(self, scene: Scene) -> None:
         chain = links(scene)
-        closures = tuple(
-            MujocoClosure(each.name, *closed_frames(scene, chain, each), joined_points(each)) for each in scene.closures
-        )
+        closures = tuple(mujoco_closure(scene, chain, each) for each in scene.closures)
         gravity = np.array(scene.gravity_m_s2, dtype=float)
         self._tree = build_tree(chain, gravity, closures, _couplings(scene, chain))
         self._forces = Forces(self._tree, scene)

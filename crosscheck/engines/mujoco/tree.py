@@ -19,22 +19,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.engines.conventions import quaternion_of, rotation_matrix
-from crosscheck.engines.links import Attachment, Ball, Floating, Freedom, Link, Scalar, by_motion
-from crosscheck.engines.peer import is_bare_frame
+from crosscheck.engines.links import (
+    Attachment,
+    Ball,
+    Floating,
+    Freedom,
+    Link,
+    Scalar,
+    by_motion,
+    closed_frames,
+    is_bare_frame,
+    radius_of_gyration,
+)
 from crosscheck.engines.rigid_tree import Slot, scene_start
 from flexmb.scene.hinges import Closure
+from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
 ARMATURE = 1e20
 LEAST_INERTIA = 1e-14
-ARM = 0.1  # m, of points that stay together
 
 
 @dataclass(frozen=True)
 class MujocoClosure:
     """A joint that closes a loop between frames `a` and `b`, as soft as MuJoCo's defaults make it.
 
-    `points` (n, 3) of both frames stay together: one for a ball joint, two on the axis of a pin.
+    `points` (n, 3) of both frames stay together: one for a ball joint, two on the axis of a pin, three for a weld.
     """
 
     name: str
@@ -47,15 +57,26 @@ class MujocoClosure:
         return [(f"closure {number}a.{k}", f"closure {number}b.{k}") for k in range(len(self.points))]
 
 
-def joined_points(closure: Closure) -> Real:
-    """(n, 3) points of both frames that a closure keeps together."""
+def mujoco_closure(scene: Scene, links: tuple[Link, ...], closure: Closure) -> MujocoClosure:
+    """A closure whose kind `obstacle` takes.
+
+    The points are as far from the frames as the larger radius of gyration of the two bodies about these: then what keeps
+    them together is about as stiff against turns as against displacements, whatever the size of the scene. (The rows of
+    MuJoCo's own weld are the vector of a quaternion, whose load is twice the torque, and that only in a closed loop.)
+    """
+    a, b = closed_frames(scene, links, closure)
+    arm = max(radius_of_gyration(links, a), radius_of_gyration(links, b))
     match closure.type:
         case "spherical":
-            return np.zeros((1, 3))
+            points = np.zeros((1, 3))
         case "revolute":
-            return ARM * np.outer([-1.0, 1.0], closure.axis)
+            points = arm * np.outer([-1.0, 1.0], closure.axis)
+        case "weld":
+            around = 2.0 / 3.0 * np.pi * np.arange(3)
+            points = arm * np.stack([np.cos(around), np.sin(around), np.zeros(3)], axis=1)
         case _:
             raise NotImplementedError(f'closure "{closure.name}", which `obstacle` refuses, has reached the adapter')
+    return MujocoClosure(closure.name, a, b, points)
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ import pytest
 import flexmb as fm
 from crosscheck.engines.contract import Effort, Run
 from crosscheck.engines.registry import engine
+from crosscheck.mutation.invariances import units
 from crosscheck.running import starts
 from flexmb.scene.build import angular, linear
 from flexmb.scene.hinges import WITH_AXIS, ClosureKind
@@ -90,17 +91,19 @@ def test_pinocchio_keeps_them_over_time(kind: ClosureKind) -> None:
     assert off(mine.loads, theirs.loads) <= 1e-8
 
 
-def pinned(crank: float, coupler: float, rocker: float, ground: float, angles: tuple[float, float, float]) -> Scene:
-    """A plane four-bar with four revolute pins: three of 18 rows are redundant."""
-    tree = fm.SceneBuilder("pinned", gravity=(0.0, -9.81, 0.0))
+def pinned(
+    crank: float, coupler: float, rocker: float, ground: float, angles: tuple[float, float, float], size: float = 1.0
+) -> Scene:
+    """A plane four-bar with four revolute pins: three of 18 rows are redundant. Lengths and gravity are `size` times as
+    large, so that all sizes move alike."""
+    tree = fm.SceneBuilder("pinned", gravity=(0.0, -9.81 * size, 0.0))
     for name, length in (("crank", crank), ("coupler", coupler), ("rocker", rocker)):
-        moments = (1e-3, length**3 / 12.0, length**3 / 12.0)
-        tree.rigid_body(
-            name, mass=length, com=(0.5 * length, 0.0, 0.01), inertia=moments, nodes={"e": (length, 0.0, 0.0)}
-        )
+        moments = size**2 * np.array([1e-3, length**3 / 12.0, length**3 / 12.0])
+        com, end = size * np.array([0.5 * length, 0.0, 0.01]), (size * length, 0.0, 0.0)
+        tree.rigid_body(name, mass=length, com=com, inertia=moments, nodes={"e": end})
     tree.revolute("drive", "ground", "crank", angle=angles[0], rate=2.0, given=True)
     tree.revolute("pin", "crank", "coupler", parent_node="e", angle=angles[1])
-    tree.revolute("pivot", "ground", "rocker", parent_position=(ground, 0.0, 0.0), angle=angles[2])
+    tree.revolute("pivot", "ground", "rocker", parent_position=(size * ground, 0.0, 0.0), angle=angles[2])
     tree.closure("loop", "revolute", "coupler", "rocker", node_a="e", node_b="e")
     return tree.marker("joint", "coupler", node="e").scene()
 
@@ -135,14 +138,84 @@ def test_mujoco_keeps_pins_softly() -> None:
     assert np.abs(mine.markers["joint"].position - theirs.markers["joint"].position).max() <= 2e-4
     known = [2, 3, 4]
     assert np.allclose(mine.loads["loop"][-1, known], theirs.loads["loop"][-1, known], atol=2e-3)
-    weld = msgspec.structs.replace(scene.closures[0], type="weld")
-    refused = engine("mujoco").supports(msgspec.structs.replace(scene, closures=(weld,)))
-    assert refused.kind == "no" and "of type weld" in refused.reason
 
 
-def test_rows_that_only_seem_redundant_are_told() -> None:
-    """A rhombus that is folded flat at the start, where one row more is redundant than elsewhere."""
+def resized(scene: Scene, size: float, monkeypatch: pytest.MonkeyPatch) -> Scene:
+    """The scene with all lengths, gravity and forces `size` times as large, and torques by its square."""
+    for name, factor in (("LENGTH", size), ("MASS", 1.0), ("TIME", 1.0)):
+        monkeypatch.setattr(units, name, factor)
+    return msgspec.structs.replace(units._in_units(scene), allow=units.UNUSUAL)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("size", [1e-6, 1e5])
+def test_rows_of_mixed_units_are_told_apart_at_any_size(
+    kind: ClosureKind, size: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before, rows that were small in their units were left out as redundant, and loads were off by all of their size."""
+    pytest.importorskip("pinocchio")
+    scene = resized(msgspec.structs.replace(loop(kind), couplings=()), size, monkeypatch)
+    mine, theirs = (engine(each).compile(scene).evaluate() for each in ("native", "pinocchio"))
+    largest = max(np.abs(load[3:]).max() for load in mine.loads.values())
+    for name, load in mine.loads.items():
+        assert np.abs(theirs.loads[name] - load)[3:].max() <= 1e-11 * largest
+        assert np.abs(theirs.loads[name] - load)[:3].max() <= 1e-11 * largest * size
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 100.0])
+def test_points_of_mujoco_are_as_far_apart_as_bodies_are_large(size: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Loads are within its softness; with points 0.1 m from the frame those of bodies of 100 m were off by a quarter."""
+    pytest.importorskip("mujoco")
+    scene, run = resized(loop("revolute"), size, monkeypatch), Run(np.linspace(0.0, 0.3, 4))
+    mine = engine("native").compile(scene).simulate(run, Effort("tolerance", 1e-9, "dop853"))
+    largest = max(np.abs(load[:, 3:]).max() for load in mine.loads.values())
+
+    def off_by() -> float:
+        theirs = engine("mujoco").compile(scene).simulate(run, Effort("step", 1e-3, "RK4"))
+        return max(np.abs(theirs.loads[name] - load)[-1, 3:].max() for name, load in mine.loads.items()) / largest
+
+    assert off_by() <= 1e-3
+    monkeypatch.setattr("crosscheck.engines.mujoco.tree.radius_of_gyration", lambda links, at: 1e-3 * size)
+    assert off_by() >= 0.1  # much too near
+
+
+def gripped() -> Scene:
+    """A box in free flight that a weld holds to the second of two bodies on a chain."""
+    tree = fm.SceneBuilder("gripped", gravity=(0.4, -0.3, -9.81))
+    for name, mass in (("crank", 1.0), ("rod", 2.0), ("box", 1.5)):
+        tree.rigid_body(
+            name, mass=mass, com=(0.2, 0.02, 0.05), inertia=np.diag([0.01, 0.03, 0.04]), nodes={"e": (0.5, 0.0, 0.0)}
+        )
+    tree.revolute("a", "ground", "crank", axis=(0.0, 1.0, 0.0), angle=-0.3, rate=1.0)
+    tree.spherical("b", "crank", "rod", parent_node="e", angular_velocity=(0.5, -0.3, 0.7))
+    tree.free("f", "ground", "box", position=(0.7, 0.0, 0.0))
+    tree.closure("grip", "weld", "rod", "box", position_a=(0.2, 0.1, 0.05))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", fm.SceneWarning)  # the box begins where the weld puts it
+        return starts.closed(tree.marker("tip", "box").scene())
+
+
+def test_mujoco_keeps_welds_by_three_points() -> None:
+    pytest.importorskip("mujoco")
+    scene, run = gripped(), Run(np.linspace(0.0, 0.3, 4))
+    supported = engine("mujoco").supports(scene)
+    assert supported.kind == "surrogate" and "springs and dampers" in supported.reason
+    mine = engine("native").compile(scene).simulate(run, Effort("tolerance", 1e-9, "dop853"))
+    theirs = engine("mujoco").compile(scene).simulate(run, Effort("step", 1e-3, "RK4"))
+    assert np.abs(mine.markers["tip"].position - theirs.markers["tip"].position).max() <= 5e-4
+    largest = max(np.abs(load).max() for load in mine.loads.values())
+    for name, load in mine.loads.items():
+        assert np.abs(theirs.loads[name] - load).max() <= 5e-3 * largest
+    apart = msgspec.structs.replace(scene, closures=())
+    free = engine("native").compile(apart).simulate(run, Effort("tolerance", 1e-9, "dop853"))
+    assert np.abs(mine.markers["tip"].position - free.markers["tip"].position).max() >= 0.02  # what the weld does
+
+
+@pytest.mark.parametrize("size", [1e-4, 1.0, 100.0])
+def test_rows_that_only_seem_redundant_are_told(size: float) -> None:
+    """A rhombus that is folded flat at the start, where one row more is redundant than elsewhere. Before, gaps below
+    1 mm were none, however small the bodies."""
     pytest.importorskip("exudyn")
-    scene, run = pinned(1.0, 1.0, 1.0, 1.0, (0.0, 0.0, 0.0)), Run(np.linspace(0.0, 0.5, 6))
+    scene, run = pinned(1.0, 1.0, 1.0, 1.0, (0.0, 0.0, 0.0), size), Run(np.linspace(0.0, 0.5, 6))
     found = engine("exudyn").compile(scene).simulate(run, Effort("step", 1e-3, "TrapezoidalIndex2"))
     assert found.status == "diverged" and 'closure "loop" opened: rows that are redundant' in found.message
