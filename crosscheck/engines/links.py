@@ -206,9 +206,7 @@ def radius_of_gyration(chain: tuple[Link, ...], at: Attachment) -> float:
     return float(np.sqrt(0.5 * np.trace(own.inertia) / own.mass + arm @ arm))
 
 
-def closed_frames(
-    scene: Scene, chain: tuple[Link, ...], item: Closure | BetweenNodes
-) -> tuple[Attachment, Attachment]:
+def closed_frames(scene: Scene, chain: tuple[Link, ...], item: Closure | BetweenNodes) -> tuple[Attachment, Attachment]:
     """Frames A and B of a closure or of a connector, link -1 being World."""
     a, b = ends(item)
     return _closed_frame(scene, chain, a), _closed_frame(scene, chain, b)

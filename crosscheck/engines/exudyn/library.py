@@ -49,8 +49,8 @@ def matrix(values: Real):
 
 @contextmanager
 def evaluator(mbs: Any) -> Iterator[tuple[Any, int]]:
-    """Exudyn's implicit solver at the initial state of a system, for single evaluations of its equations, and the number
-    of its coordinates; the solver is finalised whatever happens."""
+    """Exudyn's implicit solver at the initial state of a system, for single evaluations of its equations, and the
+    number of its coordinates; the solver is finalised whatever happens."""
     exudyn = load()
     settings = exudyn.SimulationSettings()
     settings.solution.file.write = False

@@ -12,8 +12,8 @@ from flexmb.scene.schema import Scene
 
 _RUNGS = 4
 _SOFT = (
-    "closures and couplings are springs and dampers (its defaults): loops open by 1e-4 to 1e-3 of their size under load, "
-    "and near a stiff position loads may be off by their size"
+    "closures and couplings are springs and dampers (its defaults): loops open by 1e-4 to 1e-3 of their size under "
+    "load, and near a stiff position loads may be off by their size"
 )
 
 

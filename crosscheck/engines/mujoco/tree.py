@@ -60,9 +60,9 @@ class MujocoClosure:
 def mujoco_closure(scene: Scene, links: tuple[Link, ...], closure: Closure) -> MujocoClosure:
     """A closure whose kind `obstacle` takes.
 
-    The points are as far from the frames as the larger radius of gyration of the two bodies about these: then what keeps
-    them together is about as stiff against turns as against displacements, whatever the size of the scene. (The rows of
-    MuJoCo's own weld are the vector of a quaternion, whose load is twice the torque, and that only in a closed loop.)
+    The points are as far from the frames as the larger radius of gyration of the two bodies about these: then what
+    keeps them together is about as stiff against turns as against displacements, whatever the size of the scene. (The
+    rows of MuJoCo's own weld are those of a quaternion, and their loads are twice the torque.)
     """
     a, b = closed_frames(scene, links, closure)
     arm = max(radius_of_gyration(links, a), radius_of_gyration(links, b))

@@ -110,8 +110,8 @@ class PinocchioConnections:
 
 
 class ClosedLoad(NamedTuple):
-    """The load of a closure: `wrench` [torque; force] (6,) on B about `place` (3,) m, both in World axes, and the joints
-    of A and B, 0 for World."""
+    """The load of a closure: `wrench` [torque; force] (6,) on B about `place` (3,) m, both in World axes, and the
+    joints of A and B, 0 for World."""
 
     wrench: Real
     place: Real

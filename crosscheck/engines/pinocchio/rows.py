@@ -77,8 +77,8 @@ class PinocchioRows:
         """(nv,) generalised forces that keep what is kept, from the accelerations (nv,) without them.
 
         J M^-1 J' f = -(J a + dJ/dt v) with the mass matrix M of the free speeds. With M = L L' and W = L^-1 J', whose
-        columns scaled to length one are U S V', the loads are f = -V S^-2 V' (J a + dJ/dt v) but for these scales; where
-        rows are redundant, they are the least such ones.
+        columns scaled to length one are U S V', the loads are f = -V S^-2 V' (J a + dJ/dt v) but for these scales;
+        where rows are redundant, they are the least such ones.
         """
         M = pin.crba(self._model, self._data, state.q)
         M = np.triu(M) + np.triu(M, 1).T

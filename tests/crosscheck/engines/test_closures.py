@@ -152,7 +152,7 @@ def resized(scene: Scene, size: float, monkeypatch: pytest.MonkeyPatch) -> Scene
 def test_rows_of_mixed_units_are_told_apart_at_any_size(
     kind: ClosureKind, size: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Before, rows that were small in their units were left out as redundant, and loads were off by all of their size."""
+    """Before, rows that were small in their units were left out as redundant: loads were off by all of their size."""
     pytest.importorskip("pinocchio")
     scene = resized(msgspec.structs.replace(loop(kind), couplings=()), size, monkeypatch)
     mine, theirs = (engine(each).compile(scene).evaluate() for each in ("native", "pinocchio"))
@@ -164,7 +164,7 @@ def test_rows_of_mixed_units_are_told_apart_at_any_size(
 
 @pytest.mark.parametrize("size", [1e-3, 1.0, 100.0])
 def test_points_of_mujoco_are_as_far_apart_as_bodies_are_large(size: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Loads are within its softness; with points 0.1 m from the frame those of bodies of 100 m were off by a quarter."""
+    """Loads are within its softness; with points 0.1 m from the frame those of 100 m long bodies were off by 23 %."""
     pytest.importorskip("mujoco")
     scene, run = resized(loop("revolute"), size, monkeypatch), Run(np.linspace(0.0, 0.3, 4))
     mine = engine("native").compile(scene).simulate(run, Effort("tolerance", 1e-9, "dop853"))
