@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from flexmb.closure import dynamics
 from flexmb.closure.branch import GAPS, UNRECORDED
+from flexmb.closure.constants import SUPPRESSED
 from flexmb.closure.factor import DEPENDENT
 from flexmb.closure.null_loads import GroupResponse, blocks, null_loads
 from flexmb.closure.tables import ROTATION, Closed, ClosureConstants, ClosureWorkspace, Recursion, workspace
@@ -418,11 +419,11 @@ class Closures:
     @kept
     def _kept_parallel(self) -> tuple[Index, Index]:
         """Numbers of closures, and places on the diagonals of their rotations, of all axes that are kept parallel."""
-        about = {"weld": (1, 2), "prismatic": (1, 2), "universal": (), "spherical": ()}
+        about = {"xyz": (1, 2), "xy": (2,)}  # by the turns that a closure suppresses
         pairs = [
             (i, 4 * axis)
             for i, closure in enumerate(self.scene) if not isinstance(closure, Coupling)
-            for axis in about.get(closure.type, (2,))
+            for axis in about.get(SUPPRESSED[closure.type][0], ())
         ]  # fmt: skip
         which, places = np.array(pairs, np.int64).reshape(-1, 2).T
         return which, places

@@ -24,6 +24,8 @@ SUPPRESSED = {
     "universal": ("z", "xyz"),
     "spherical": ("", "xyz"),
     "planar": ("xy", "z"),
+    "in_line": ("", "xy"),
+    "in_plane": ("", "z"),
 }
 
 

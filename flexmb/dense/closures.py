@@ -59,9 +59,10 @@ def suppressed(closure: s.Closure) -> tuple[list[tuple[Real, Real]], list[Real]]
     turns = {
         "weld": [(ey, ez), (ex, ez), (ex, ey)], "prismatic": [(ey, ez), (ex, ez), (ex, ey)],
         "revolute": [(x, z), (y, z)], "cylindrical": [(x, z), (y, z)], "planar": [(ex, ez), (ey, ez)],
-        "universal": [(ex, ey)], "spherical": [],
+        "universal": [(ex, ey)], "spherical": [], "in_line": [], "in_plane": [],
     }[closure.type]  # fmt: skip
-    return turns, {"prismatic": [x, y], "cylindrical": [x, y], "planar": [ez]}.get(closure.type, [ex, ey, ez])
+    across = {"prismatic": [x, y], "cylindrical": [x, y], "planar": [ez], "in_line": [x, y], "in_plane": [z]}
+    return turns, across.get(closure.type, [ex, ey, ez])
 
 
 def relation(dense: DenseSystem, coupling: s.Coupling) -> tuple[Real, Real]:

@@ -184,13 +184,16 @@ class Free(_Hinge, frozen=True, kw_only=True, tag="free"):
 
 
 Hinge = Weld | Revolute | Prismatic | Cylindrical | Universal | Gimbal | Spherical | Planar | Free | Screw
-WITH_AXIS = tuple(
-    struct.__struct_config__.tag for struct in get_args(Hinge) if "axis" in struct.__struct_fields__
-)
-"""Kinds that have an axis of their own."""
+WITH_AXIS = (
+    *(struct.__struct_config__.tag for struct in get_args(Hinge) if "axis" in struct.__struct_fields__),
+    "in_line", "in_plane",
+)  # fmt: skip
+"""Kinds of hinges and closures that have an axis of their own."""
 
 
-ClosureKind = Literal["weld", "revolute", "prismatic", "cylindrical", "universal", "spherical", "planar"]
+ClosureKind = Literal[
+    "weld", "revolute", "prismatic", "cylindrical", "universal", "spherical", "planar", "in_line", "in_plane"
+]
 
 
 class Closure(SceneStruct, frozen=True, kw_only=True):
@@ -198,10 +201,11 @@ class Closure(SceneStruct, frozen=True, kw_only=True):
 
     Frame A is the node frame of `body_a` ("ground" too) displaced by `position_a_m`, `quaternion_a` (fixed offsets in
     node axes), frame B likewise on `body_b`. The closure lets B move relative to A as the hinge of that `type` lets its
-    outboard frame move relative to its inboard one; `axis` has the same components in both frames. Initial coordinates
-    need to fit only roughly: a near state that closes all loops is found, that keeps what is given (see
-    AngularCoordinate). Its load is an output: on `body_b`, about B. A gimbal of two axes is a universal closure between
-    turned frames, one of three a spherical one.
+    outboard frame move relative to its inboard one; `axis` has the same components in both frames. Two more types are
+    no hinges, as B may turn at will: `in_line` keeps its origin on the line along `axis` of A (a pin in a slot, a ball
+    in a groove), `in_plane` in the plane across it. Initial coordinates need to fit only roughly: a near state that
+    closes all loops is found, that keeps what is given (see AngularCoordinate). Its load is an output: on `body_b`,
+    about B. A gimbal of two axes is a universal closure between turned frames, one of three a spherical one.
     """
 
     name: str

@@ -230,11 +230,9 @@ class SchemaMethods(Collector):
         return self._made(s.ModalState, locals())
 
     def closure(
-        self, name: str,
-        type: Literal["cylindrical", "planar", "prismatic", "revolute", "spherical", "universal", "weld"],
-        body_a: str, body_b: str, *, node_a: str = "origin", node_b: str = "origin", position_a: ArrayLike = ZERO,
-        quaternion_a: ArrayLike = IDENTITY, position_b: ArrayLike = ZERO, quaternion_b: ArrayLike = IDENTITY,
-        axis: ArrayLike = Z_AXIS,
+        self, name: str, type: str, body_a: str, body_b: str, *, node_a: str = "origin", node_b: str = "origin",
+        position_a: ArrayLike = ZERO, quaternion_a: ArrayLike = IDENTITY, position_b: ArrayLike = ZERO,
+        quaternion_b: ArrayLike = IDENTITY, axis: ArrayLike = Z_AXIS,
     ) -> Self:  # fmt: skip
         """A loop closure on top of the tree: a hinge between any two nodes, whose motions are not coordinates.
 

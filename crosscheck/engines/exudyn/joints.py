@@ -130,6 +130,8 @@ CONSTRAINED: dict[ClosureKind, Sequence[int]] = {
     "cylindrical": [1, 1, 0, 1, 1, 0],
     "universal": [1, 1, 1, 0, 0, 1],
     "planar": [0, 0, 1, 1, 1, 0],
+    "in_line": [1, 1, 0, 0, 0, 0],
+    "in_plane": [0, 0, 1, 0, 0, 0],
 }
 """Displacements along and turns about x, y, z of frame A that a closure's joint suppresses, z being its axis."""
 

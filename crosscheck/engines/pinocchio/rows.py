@@ -30,6 +30,8 @@ _KEPT: dict[ClosureKind, tuple[tuple[tuple[int, int], ...], tuple[int, ...]]] = 
     "planar": (((0, 2), (1, 2)), (2,)),
     "universal": (((0, 1),), _EVERY),
     "spherical": ((), _EVERY),
+    "in_line": ((), (0, 1)),
+    "in_plane": ((), (2,)),
 }
 """Which axes of A and B a closure keeps at right angles, and along which axes of A it keeps B at A; z is its axis."""
 DEPENDENT = 1e-9

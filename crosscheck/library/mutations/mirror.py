@@ -120,6 +120,8 @@ def _closure(closure: Closure, axis: int) -> bool:
             return frames and along(closure.axis, axis)
         case "prismatic":
             return frames and within(closure.axis, axis)
+        case "in_line" | "in_plane":
+            return frames and (along(closure.axis, axis) or within(closure.axis, axis))
         case "cylindrical" | "universal" | "planar":
             return False
         case _:

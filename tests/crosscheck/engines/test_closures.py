@@ -195,6 +195,13 @@ def gripped() -> Scene:
         return starts.closed(tree.marker("tip", "box").scene())
 
 
+@pytest.mark.parametrize("kind", ["prismatic", "cylindrical", "universal", "planar", "in_line", "in_plane"])
+def test_mujoco_refuses_what_points_do_not_make(kind: ClosureKind) -> None:
+    pytest.importorskip("mujoco")
+    refused = engine("mujoco").supports(loop(kind))
+    assert refused.kind == "no" and f'closure "loop" is of type {kind}: MuJoCo closes loops by' in refused.reason
+
+
 def test_mujoco_keeps_welds_by_three_points() -> None:
     pytest.importorskip("mujoco")
     scene, run = gripped(), Run(np.linspace(0.0, 0.3, 4))

@@ -129,6 +129,10 @@ def _pose(rng: Generator, kind: str, axis: Array) -> tuple[Array, Array]:
             return Rotation.random(random_state=rng).as_matrix(), np.zeros(3)
         case "planar":
             return Rotation.from_rotvec([0.0, 0.0, angle]).as_matrix(), distance * (1.0, 1.0, 0.0)
+        case "in_line":
+            return Rotation.random(random_state=rng).as_matrix(), distance[0] * axis
+        case "in_plane":
+            return Rotation.random(random_state=rng).as_matrix(), distance - distance @ axis * axis
     return np.eye(3), np.zeros(3)
 
 

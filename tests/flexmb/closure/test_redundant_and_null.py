@@ -23,8 +23,8 @@ ZERO, MOVING = 1e-10, 1e-6  # singular values of J, of entries of size 1: none l
 FEW, ALL = 12, 500
 
 
-def check(seed: int) -> None:
-    scene = loops.random_loops(seed)
+def check(seed: int, kinds: tuple[str, ...] = loops.KINDS) -> None:
+    scene = loops.random_loops(seed, kinds)
     system = flexmb.compile(scene)
     if not can_move(scene):
         with pytest.raises(flexmb.ClosureError, match="no speeds keep it closed"):
@@ -83,6 +83,12 @@ def test_random_loops(seed):
     check(seed)
 
 
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.filterwarnings("ignore:.*the closures do not allow these values")
+def test_random_lines_and_planes(seed):
+    check(seed, loops.LATER)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("start", range(FEW, ALL, 25))
 def test_many_random_loops(start):
@@ -91,8 +97,8 @@ def test_many_random_loops(start):
 
 
 def test_every_kind_and_every_situation_is_among_them():
-    scenes = [loops.random_loops(seed) for seed in range(FEW)]
-    assert {closure.type for scene in scenes for closure in scene.closures} == set(loops.KINDS)
+    scenes = [loops.random_loops(seed, kinds) for seed in range(FEW) for kinds in (loops.KINDS, loops.LATER)]
+    assert {closure.type for scene in scenes for closure in scene.closures} == set(loops.EVERY)
     pairs = {tuple(sorted((closure.body_a, closure.body_b))) for scene in scenes for closure in scene.closures}
     assert {("r0", "r1"), ("ground", "r1"), ("r1", "r2")} <= pairs
 
@@ -117,7 +123,7 @@ def test_rows_that_are_compared_with_noise_are_noticed(monkeypatch):
         return status
 
     monkeypatch.setattr(closure_system.dynamics, "linearise", by_own_rows)
-    assert any(_rank(pendulum(kind)) > 0 for kind in loops.KINDS)
+    assert any(_rank(pendulum(kind)) > 0 for kind in loops.EVERY)
 
 
 def _rank(scene: s.Scene) -> int:
@@ -141,7 +147,7 @@ def pendulum(kind: str | None, *, driven: s.Function | None = None) -> s.Scene:
     return scene.scene()
 
 
-@pytest.mark.parametrize("kind", loops.KINDS)
+@pytest.mark.parametrize("kind", loops.EVERY)
 def test_between_welded_bodies_a_closure_restrains_nothing(kind):
     tree, system = flexmb.compile(pendulum(None)), flexmb.compile(pendulum(kind))
     state = system.initial_state
@@ -182,7 +188,7 @@ def test_a_node_at_which_a_flexible_body_is_held_does_not_move():
     scene.weld("hold", "ground", "beam", child_node="tip", parent_quaternion=turn / np.linalg.norm(turn))
     scene.modal_state("beam", coordinates=[0.01, 0.02, -0.01, 0.005], rates=[0.0] * 4)
     tree = flexmb.compile(scene.scene())
-    for kind in loops.KINDS:
+    for kind in loops.EVERY:
         closure = loops.parallel("null", kind, scene.scene().hinges[0], scene.scene())
         system = flexmb.compile(msgspec.structs.replace(scene.scene(), closures=(closure,)))
         state = system.initial_state
