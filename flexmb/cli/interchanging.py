@@ -27,6 +27,13 @@ def import_(
         bool,
         typer.Option("--repair", help="URDF, SID: change impossible inertia tensors by the least amount."),
     ] = False,
+    stop_stiffness: Annotated[
+        float | None, typer.Option(help="URDF, MJCF: limits become stops, of N m/rad or N/m.", show_default=False)
+    ] = None,
+    smoothing: Annotated[
+        float | None,
+        typer.Option(help="URDF, MJCF: dry friction, smooth below this rate (rad/s or m/s).", show_default=False),
+    ] = None,
 ) -> None:
     """
     Convert a robot (URDF, MJCF) or a flexible body (SID) to a scene.
@@ -38,7 +45,7 @@ def import_(
 
         flexmb import robot.urdf --out robot.toml
         flexmb import quadruped.urdf --free-base
-        flexmb import humanoid.xml
+        flexmb import humanoid.xml --stop-stiffness 1e4 --smoothing 1e-3
         flexmb import panel.sid --out panel.toml
 
     **Exit code**: 0 written, 2 the model cannot be a scene: the message names the place and the remedy.
@@ -47,7 +54,7 @@ def import_(
         from flexmb.interchange.models import read_model
 
         check_folder(out.parent)
-        found = read_model(model, free_base, repair)
+        found = read_model(model, free_base, repair, stop_stiffness, smoothing)
         _write(found.scene, out, found.notes)
 
 

@@ -14,6 +14,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from flexmb.interchange.imported import ImportedScene, ModelError, listed, naming
+from flexmb.interchange.joint_connectors import SMOOTH, STOPS, JointConnectors
 from flexmb.interchange.mjcf_closures import CONNECT, WELD, MjcfClosures
 from flexmb.interchange.mjcf_couplings import JOINT, TENDON, MjcfCouplings, tendon_that_acts
 from flexmb.interchange.mjcf_text import refuse_bad_text
@@ -30,16 +31,21 @@ KNOWN_EQUALITIES = (CONNECT, WELD, JOINT, TENDON)
 JOINT_TRANSMISSIONS = (0, 1)  # mjtTrn: joint, jointinparent, which are the same for hinges and slides
 
 
-def read_mjcf(path: str | os.PathLike[str]) -> ImportedScene:
+def read_mjcf(
+    path: str | os.PathLike[str], *, stop_stiffness: float | None = None, smoothing: float | None = None
+) -> ImportedScene:
     """The rigid tree of an MJCF file (or of a URDF file, as MuJoCo reads it), at its reference pose and at rest.
 
     Springs, dampers and armatures of joints are included, those of actuators at joints too, and gravity compensation.
-    Linear equality constraints between joints or of fixed tendons become couplings, connect and weld become closures.
-    Contacts, limits, dry friction, forces of actuators, tendons that only measure or pull, and sensors are omitted, and
-    the notes list them. Raises ImportError without MuJoCo; ModelError for a file that MuJoCo refuses, for numbers that
-    are not finite, which MuJoCo would replace by defaults (`flexmb.interchange.mjcf_text`), and for what changes
-    the motion and has no counterpart in a scene: nonlinear equality constraints, tendons with springs, dampers or
-    armatures, armatures of free and ball joints, nonlinear springs and dampers, fluids, flexible parts.
+    The armature of a free joint is mass and inertia that its body has without weight. Linear equality constraints
+    between joints or of fixed tendons become couplings, connect and weld become closures. With `stop_stiffness`
+    (N m/rad or N/m) limits of hinges and slides become stops, with `smoothing` (rad/s or m/s) their dry friction
+    becomes a connector that is smooth below that rate. Contacts, other limits and friction, forces of actuators,
+    tendons that only measure or pull, and sensors are omitted, and the notes list them. Raises ImportError without
+    MuJoCo; ModelError for a file that MuJoCo refuses, for numbers that are not finite, which MuJoCo would replace by
+    defaults (`flexmb.interchange.mjcf_text`), and for what changes the motion and has no counterpart in a scene:
+    nonlinear equality constraints, tendons with springs, dampers or armatures, armatures of ball joints, nonlinear
+    springs and dampers, fluids, flexible parts. ValueError for options that are not positive.
     """
     try:
         import mujoco
@@ -51,15 +57,17 @@ def read_mjcf(path: str | os.PathLike[str]) -> ImportedScene:
     except ValueError as error:
         raise ModelError(f"{path}: MuJoCo refuses the model: {error}") from None
     with naming(str(path)):
-        return _Model(str(path), model).scene()
+        return _Model(str(path), model, stop_stiffness, smoothing).scene()
 
 
 class _Model:
     """A compiled model; `m` has MuJoCo's names."""
 
-    def __init__(self, file: str, m: Any) -> None:
+    def __init__(self, file: str, m: Any, stop_stiffness: float | None, smoothing: float | None) -> None:
         self.file, self.m = file, m
         self._refuse()
+        taken = {str(m.joint(j).name) for j in range(m.njnt)} | {str(m.equality(i).name) for i in range(m.neq)}
+        self.extras = JointConnectors(stop_stiffness, smoothing, taken)
         self.couplings = MjcfCouplings(m, [self._joint_name(j) for j in range(m.njnt)], self._fail)
         self.closures = MjcfClosures(m, self._body_name)
         self._armature, self._damping = self._along_dofs("armature"), self._along_dofs("damping")
@@ -74,6 +82,8 @@ class _Model:
             self._body(builder, k)
         self.couplings.couple(builder)
         self.closures.close(builder)
+        for j in range(m.njnt):
+            self._connect(builder, j)
         return ImportedScene(builder.scene(), tuple(self._notes()))
 
     def _body(self, builder: SceneBuilder, k: int) -> None:
@@ -81,16 +91,18 @@ class _Model:
         m, name = self.m, self._body_name(k)
         R = rotation_matrix(m.body_iquat[k])
         inertia = R @ np.diag(m.body_inertia[k]) @ R.T
-        lift = -float(m.body_gravcomp[k] * m.body_mass[k]) * self.gravity
+        own, com, extra = float(m.body_mass[k]), np.array(m.body_ipos[k]), self._borne(k)
+        lift = -float(m.body_gravcomp[k]) * own * self.gravity
+        # an armature of all six speeds is a point mass at the frame and an inertia that is the same about all axes
+        reduced = own * extra / ((own + extra) or 1.0)
+        inertia = 0.5 * (inertia + inertia.T) + extra * np.eye(3)
         builder.rigid_body(
-            name, mass=float(m.body_mass[k]), com=m.body_ipos[k], inertia=0.5 * (inertia + inertia.T),
-            nodes={"mass centre": m.body_ipos[k]} if np.any(lift) else (),
+            name, mass=own + extra, com=own * com / ((own + extra) or 1.0) if extra else com,
+            inertia=inertia + reduced * (com @ com * np.eye(3) - np.outer(com, com)),
+            nodes={"mass centre": com} if np.any(lift) else (),
         )  # fmt: skip
-        if np.any(lift):
-            size = float(np.linalg.norm(lift))
-            builder.force(
-                f"{name}.gravcomp", name, node="mass centre", direction=lift / size, function=Constant(value=size)
-            )
+        self._lift(builder, f"{name}.gravcomp", name, "mass centre", lift)
+        self._lift(builder, f"{name}.armature", name, "origin", -extra * self.gravity)
         parent = self._body_name(int(m.body_parentid[k]))
         at = {"parent_position": m.body_pos[k], "parent_quaternion": m.body_quat[k]}
         joints = range(m.body_jntadr[k], m.body_jntadr[k] + m.body_jntnum[k])
@@ -103,6 +115,30 @@ class _Model:
                 builder.rigid_body(child, mass=0.0, inertia=np.zeros((3, 3)))
             self._hinge(builder, j, parent, child, at)
             parent, at = child, {"parent_position": np.zeros(3), "parent_quaternion": np.array([1.0, 0.0, 0.0, 0.0])}
+
+    def _borne(self, k: int) -> float:
+        """kg and kg m²: the armature of the free joint of body k."""
+        first = int(self.m.body_jntadr[k])
+        free = self.m.body_jntnum[k] == 1 and self.m.jnt_type[first] == FREE
+        return float(self._armature[self.m.jnt_dofadr[first]]) if free else 0.0
+
+    def _lift(self, builder: SceneBuilder, name: str, body: str, node: str, lift: Real) -> None:
+        """A constant force (3,) N in World axes, where there is any."""
+        if np.any(lift):
+            size = float(np.linalg.norm(lift))
+            builder.force(name, body, node=node, direction=lift / size, function=Constant(value=size))
+
+    def _connect(self, builder: SceneBuilder, j: int) -> None:
+        """Stops at the limits of a hinge or slide, and its dry friction, where they were asked for."""
+        m, name, turns = self.m, self._joint_name(j), int(self.m.jnt_type[j]) == HINGE
+        if int(m.jnt_type[j]) not in SINGLE:
+            return
+        if m.jnt_limited[j] and self.extras.stop_stiffness is not None:
+            lower, upper = (float(each - m.qpos0[m.jnt_qposadr[j]]) for each in m.jnt_range[j])
+            self.extras.stop(builder, name, turns, lower, upper)
+        sliding = float(m.dof_frictionloss[m.jnt_dofadr[j]])
+        if sliding and self.extras.smoothing is not None:
+            self.extras.rub(builder, name, turns, sliding)
 
     def _hinge(self, builder: SceneBuilder, j: int, parent: str, child: str, at: dict[str, Any]) -> None:
         m, name, dof = self.m, self._joint_name(j), int(self.m.jnt_dofadr[j])
@@ -173,8 +209,8 @@ class _Model:
             self._fail("option has density, viscosity or wind, and scenes have no fluid", "set them to zero")
         for j in range(m.njnt):
             first, place = int(m.jnt_dofadr[j]), int(m.jnt_qposadr[j])
-            if m.jnt_type[j] in (FREE, BALL) and m.dof_armature[first]:
-                what = f'the free or ball joint "{self._joint_name(j)}" has the armature {m.dof_armature[first]:g}'
+            if m.jnt_type[j] == BALL and m.dof_armature[first]:
+                what = f'the ball joint "{self._joint_name(j)}" has the armature {m.dof_armature[first]:g}'
                 self._fail(what, "set it to zero: in scenes, only coordinates of hinges with axes have armatures")
             if m.jnt_type[j] == FREE and (m.jnt_stiffness[j] or np.any(m.dof_damping[first : first + 6])):
                 self._fail(f'free joint "{self._joint_name(j)}" has a spring or damper', "remove it")
@@ -207,10 +243,16 @@ class _Model:
         found = []
         if any(m.geom_contype) or any(m.geom_conaffinity):
             found.append("contacts are left out: bodies pass through each other")
-        if limited := [name for name, limit in zip(joints, m.jnt_limited, strict=True) if limit]:
-            found.append(f"limits of joints are left out: {listed(limited)}")
-        if rough := [joints[j] for j in sorted({int(m.dof_jntid[i]) for i in np.flatnonzero(m.dof_frictionloss)})]:
-            found.append(f"dry friction is left out: {listed(rough)}")
+        single = [kind in SINGLE for kind in m.jnt_type.tolist()]
+        stopped = self.extras.stop_stiffness is not None
+        if limited := [joints[j] for j in range(m.njnt) if m.jnt_limited[j] and not (stopped and single[j])]:
+            found.append(f"limits of joints are left out: {listed(limited)}{'' if stopped else f' ({STOPS})'}")
+        smooth = self.extras.smoothing is not None
+        rubbing = {int(m.dof_jntid[i]) for i in np.flatnonzero(m.dof_frictionloss)}
+        if rough := [joints[j] for j in sorted(rubbing) if not (smooth and single[j])]:
+            found.append(f"dry friction is left out: {listed(rough)}{'' if smooth else f' ({SMOOTH})'}")
+        if heavy := [joints[j] for j in range(m.njnt) if m.jnt_type[j] == FREE and self._armature[m.jnt_dofadr[j]]]:
+            found.append(f"armatures of free joints are mass and inertia without weight: {listed(heavy)}")
         if idle := [str(m.tendon(k).name) or f"tendon {k}" for k in range(m.ntendon)]:
             found.append(f"limits, friction and actuators of tendons are left out: {listed(idle)}")
         if self.couplings.count:

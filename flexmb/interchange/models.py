@@ -15,7 +15,10 @@ MJCF = (".xml", ".mjcf")
 ENDINGS = (".urdf", *MJCF, *SID)
 
 
-def read_model(path: str | os.PathLike[str], free_base: bool = False, repair: bool = False) -> ImportedScene:
+def read_model(
+    path: str | os.PathLike[str], free_base: bool = False, repair: bool = False,
+    stop_stiffness: float | None = None, smoothing: float | None = None,
+) -> ImportedScene:  # fmt: skip
     """The scene of a URDF, an MJCF or a SID file, which are read as `read_urdf`, `read_mjcf` and `imported_sid` do.
 
     The body of a SID file is `held`. Raises ModelError also for another ending, and for options that the kind of file
@@ -26,7 +29,7 @@ def read_model(path: str | os.PathLike[str], free_base: bool = False, repair: bo
     if ending == ".urdf":
         from flexmb.interchange.urdf import read_urdf
 
-        return read_urdf(path, free_base=free_base, repair=repair)
+        return read_urdf(path, free_base=free_base, repair=repair, stop_stiffness=stop_stiffness, smoothing=smoothing)
     if free_base:
         raise ModelError("--free-base is for URDF: an MJCF has a freejoint, and a SID file's body is joined in a scene")
     if ending in MJCF:
@@ -34,7 +37,9 @@ def read_model(path: str | os.PathLike[str], free_base: bool = False, repair: bo
             raise ModelError("--repair is for URDF and SID: MuJoCo, which compiles an MJCF, has its own checks")
         from flexmb.interchange.mjcf import read_mjcf
 
-        return read_mjcf(path)
+        return read_mjcf(path, stop_stiffness=stop_stiffness, smoothing=smoothing)
+    if stop_stiffness is not None or smoothing is not None:
+        raise ModelError("--stop-stiffness and --smoothing are for URDF and MJCF: other files have no joints")
     if ending in SID:
         from flexmb.interchange.sid import imported_sid, read_sid
 

@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from flexmb.interchange.imported import ImportedScene, ModelError, listed, naming, possible_inertia, usable
-from flexmb.interchange.urdf_mimic import Mimics
+from flexmb.interchange.joint_connectors import SMOOTH, STOPS, JointConnectors
+from flexmb.interchange.urdf_mimic import SCALAR, Mimics
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.options import Placement
 from flexmb.scene.quaternions import about, quaternion_of
@@ -32,7 +33,7 @@ ONCE = {
     "inertial": ("origin", "mass", "inertia"),
 }  # fmt: skip
 """What an element has at most once: of several, no reader could tell which one is meant."""
-IGNORED = {"limit": "limits", "safety_controller": "safety limits"}
+SAFETY, LIMITS, BEYOND = "safety_controller", "limits", "beyond their limits"
 FRICTION, DAMPING = "dry friction", "damping of floating and planar joints"
 NO_MECHANICS = ("material", "transmission", "gazebo", "sensor", "ros2_control")
 Z = np.array([0.0, 0.0, 1.0])
@@ -40,19 +41,22 @@ Z = np.array([0.0, 0.0, 1.0])
 
 def read_urdf(
     path: str | os.PathLike[str], *, gravity: ArrayLike = (0.0, 0.0, -9.81), free_base: bool = False,
-    repair: bool = False,
+    repair: bool = False, stop_stiffness: float | None = None, smoothing: float | None = None,
 ) -> ImportedScene:  # fmt: skip
     """The rigid tree of a URDF file, at its zero position and at rest, under `gravity` (m/s², World axes).
 
     The root link is welded to the ground, or free with `free_base`; its initial frame is that of the World. Many
     published robots have inertia tensors that no body can have. They raise a SceneError, or with `repair` are changed
-    by the least amount that makes them possible, and a note lists them. Damping is that of the hinges. Limits,
-    friction, shapes and transmissions are omitted; notes list limits and friction. Mimic joints become couplings, and
-    start where the joints that they mimic are at zero. Raises ModelError for a file that is not URDF or has no unique
-    root; SceneError for impossible inertia; OSError.
+    by the least amount that makes them possible, and a note lists them. Damping is that of the hinges. With
+    `stop_stiffness` (N m/rad or N/m) limits of angles and displacements become stops, with `smoothing` (rad/s or m/s)
+    dry friction becomes a connector that is smooth below that rate; without, notes list them. Shapes, transmissions,
+    and limits of efforts and rates are omitted. Mimic joints become couplings, and start where the joints that they
+    mimic are at zero. Raises ModelError for a file that is not URDF or has no unique root; SceneError for impossible
+    inertia; ValueError for options that are not positive; OSError.
     """
     with naming(str(path)):
-        return _Robot(str(path), _parsed(Path(path)), repair).scene(gravity, free_base)
+        robot = _Robot(str(path), _parsed(Path(path)), repair, stop_stiffness, smoothing)
+        return robot.scene(gravity, free_base)
 
 
 def _parsed(path: Path) -> ElementTree.Element:
@@ -83,12 +87,15 @@ def _elements(text: str) -> ElementTree.Element:
 class _Robot:
     """One robot; `place` in errors is the name of a link or joint."""
 
-    def __init__(self, file: str, robot: ElementTree.Element, repair: bool) -> None:
+    def __init__(
+        self, file: str, robot: ElementTree.Element, repair: bool, stop_stiffness: float | None, smoothing: float | None
+    ) -> None:
         self.file, self.robot, self.repair = file, robot, repair
         self.links = self._named("link")
         self.joints = self._named("joint")
         self._refuse_doubles()
         self.mimics = Mimics(self.joints, self._fail)
+        self.extras = JointConnectors(stop_stiffness, smoothing, self.joints)
         self.ignored: dict[str, list[str]] = {}
         self.repaired: list[str] = []
 
@@ -105,6 +112,8 @@ class _Robot:
         for name, joint in self.joints.items():
             self._hinge(builder, name, joint)
         self.mimics.couple(builder)
+        for name, joint in self.joints.items():
+            self._connect(builder, name, joint)
         return ImportedScene(builder.scene(), tuple(self._notes()))
 
     def _named(self, tag: str) -> dict[str, ElementTree.Element]:
@@ -195,12 +204,33 @@ class _Robot:
                 builder.planar(name, parent, child, parent_position=p, parent_quaternion=inner, child_quaternion=outer)
             case _:
                 self._fail(place, f'its type is "{kind}"', f"types are fixed, {', '.join(MOVING)}")
-        for tag in IGNORED:
-            if joint.find(tag) is not None and kind != "fixed":
-                self.ignored.setdefault(tag, []).append(name)
+        if joint.find(SAFETY) is not None and kind != "fixed":
+            self.ignored.setdefault(SAFETY, []).append(name)
+
+    def _connect(self, builder: SceneBuilder, name: str, joint: ElementTree.Element) -> None:
+        """Stops at the limits of a joint that moves, and its dry friction; or a note on them."""
+        kind, limit, dynamics = joint.get("type", ""), joint.find("limit"), joint.find("dynamics")
+        turns, single = kind != "prismatic", kind in SCALAR
+        sliding = 0.0 if dynamics is None or kind == "fixed" else _real(dynamics.get("friction", "0"))
+        if sliding and single and self.extras.smoothing is not None:
+            self.extras.rub(builder, name, turns, sliding)
+        elif sliding:
+            self.ignored.setdefault(FRICTION, []).append(name)
+        if limit is None or kind == "fixed":
+            return
+        if self.extras.stop_stiffness is None or not single:
+            self.ignored.setdefault(LIMITS, []).append(name)
+        elif kind != "continuous":
+            lower, upper = (_real(limit.get(key, "0")) for key in ("lower", "upper"))
+            if not (usable(lower) and usable(upper) and lower <= upper):
+                what = f"its limits are {limit.get('lower')!r} and {limit.get('upper')!r}"
+                self._fail(f'joint "{name}"', what, "give numbers in SI units, lower first")
+            self.extras.stop(builder, name, turns, lower, upper)
+            if not lower <= self.mimics.value(name) <= upper:
+                self.ignored.setdefault(BEYOND, []).append(name)
 
     def _losses(self, name: str, joint: ElementTree.Element) -> float:
-        """The damping of a joint that moves; its dry friction, or damping that no coordinate has, is noted."""
+        """The damping of a joint that moves; damping that no coordinate has is noted."""
         element = joint.find("dynamics")
         found = {"damping": 0.0, "friction": 0.0}
         for key in found if element is not None else ():
@@ -208,8 +238,6 @@ class _Robot:
             found[key] = _real(text := element.get(key, "0"))
             if not (usable(found[key]) and found[key] >= 0.0):
                 self._fail(f'joint "{name}"', f"{key} is {text!r}", "give a number in SI units, zero or more")
-        if found["friction"]:
-            self.ignored.setdefault(FRICTION, []).append(name)
         if found["damping"] and joint.get("type") in ("floating", "planar"):
             self.ignored.setdefault(DAMPING, []).append(name)
         return found["damping"]
@@ -248,12 +276,14 @@ class _Robot:
         return value
 
     def _notes(self) -> Iterable[str]:
-        for tag, words in IGNORED.items():
-            if names := self.ignored.get(tag):
-                yield f"{words} of joints are left out: {listed(names)}"
+        if names := self.ignored.get(LIMITS):
+            yield f"{LIMITS} of joints are left out: {listed(names)}{_without(self.extras.stop_stiffness, STOPS)}"
+        if names := self.ignored.get(SAFETY):
+            yield f"safety limits of joints are left out: {listed(names)}"
         if names := self.ignored.get(FRICTION):
-            remedy = "add angular_friction or linear_friction, which need a smoothing"
-            yield f"{FRICTION} of joints is left out, {remedy}: {listed(names)}"
+            yield f"{FRICTION} of joints is left out: {listed(names)}{_without(self.extras.smoothing, SMOOTH)}"
+        if names := self.ignored.get(BEYOND):
+            yield f"joints begin {BEYOND}, and are pushed back: {listed(names)}"
         if names := self.ignored.get(DAMPING):
             yield f"{DAMPING} is left out: {listed(names)}"
         others = sorted({each.tag for each in self.robot} - {"link", "joint", *NO_MECHANICS})
@@ -268,6 +298,11 @@ class _Robot:
 
     def _fail(self, place: str, what: str, remedy: str) -> NoReturn:
         raise ModelError(f"{self.file}: {place}: {what}: {remedy}")
+
+
+def _without(given: float | None, remedy: str) -> str:
+    """The remedy, where it was not taken; joints of several coordinates have none."""
+    return f" ({remedy})" if given is None else ""
 
 
 def _largest(a: Real) -> float:

@@ -17,7 +17,8 @@ BY_NAME = {level.name: level for level in LEVELS}
 
 @helper
 def _no_inertia(c, w, k):
-    """What a level without inertia points has of them."""
+    """Of a level by strains: it has no inertia points, and M_m and b_m of its bodies are integrals over their sections,
+    which `inertia_of_points` leaves as they are."""
 
 
 _inertia_and_bias = numbered("inertia_and_bias", LEVEL, [level.inertia_and_bias for level in LEVELS])

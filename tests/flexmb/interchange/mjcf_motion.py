@@ -14,9 +14,9 @@ from flexmb.scene.quaternions import rotation_matrix
 mujoco = pytest.importorskip("mujoco")
 
 
-def read(text: str, folder):
+def read(text: str, folder, **options):
     (folder / "creature.xml").write_text(text)
-    return read_mjcf(folder / "creature.xml")
+    return read_mjcf(folder / "creature.xml", **options)
 
 
 class Theirs(NamedTuple):

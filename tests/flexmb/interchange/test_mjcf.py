@@ -22,6 +22,11 @@ ARMED = MJCF.replace('name="pitch"', 'name="pitch" armature="0.3"').replace(
 )
 
 
+FLYING = ARMED.replace(
+    '<freejoint name="float"/>', '<joint type="free" name="float" armature="0.7" stiffness="0" damping="0"/>'
+)
+
+
 def with_actuators(actuators: str) -> str:
     return ARMED.replace("</mujoco>", f"<actuator>{actuators}</actuator></mujoco>")
 
@@ -36,6 +41,8 @@ MODELS = {
     "armature of an actuator": with_actuators('<motor joint="pitch" gear="3" armature="0.1"/>'),
     "damping of an actuator": with_actuators('<motor joint="reach" gear="-2" damping="0.7"/>'),
     "two actuators": with_actuators(2 * '<motor joint="roll" gear="0.5" armature="0.2" damping="0.1"/>'),
+    "armature of a free joint": FLYING,
+    "armature of a free joint without gravity's pull": FLYING.replace('name="trunk"', 'name="trunk" gravcomp="1"'),
     "gravity compensated": ARMED.replace('name="ankle"', 'name="ankle" gravcomp="1"').replace(
         'name="foot"', 'name="foot" gravcomp="-0.3"'
     ),
@@ -70,6 +77,25 @@ def _held_against(text: str, scene: fm.Scene) -> None:
     assert np.max(np.abs(ours - expected)) < bound * np.max(np.abs(expected))
 
 
+def test_the_armature_of_a_free_joint_is_told_and_matters(tmp_path):
+    found = read(FLYING, tmp_path)
+    assert "armatures of free joints are mass and inertia without weight: float" in found.notes
+    with pytest.raises(AssertionError):
+        _held_against(FLYING, read(ARMED, tmp_path).scene)
+
+
+def test_limits_and_friction_become_connectors(tmp_path):
+    text = MJCF.replace('name="pitch"', 'name="pitch" limited="true" range="-0.5 0.4" ref="0.1" frictionloss="0.4"')
+    without, found = read(text, tmp_path), read(text, tmp_path, stop_stiffness=50.0, smoothing=1e-3)
+    assert any("pitch" in note and note.endswith("(--stop-stiffness makes them stops)") for note in without.notes)
+    assert any("pitch" in note and note.endswith("(--smoothing makes it a connector)") for note in without.notes)
+    assert not any("pitch" in note for note in found.notes if "limits" in note or "friction" in note)
+    made = {each.name: each for each in found.scene.connectors}
+    stop, friction = made["pitch.stops"], made["pitch.friction"]
+    assert (stop.lower_rad, stop.upper_rad) == pytest.approx((-0.6, 0.3))  # beside `ref`
+    assert (stop.stop_stiffness_Nm_rad, friction.sliding_Nm, friction.smoothing_rad_s) == (50.0, 0.4, 1e-3)
+
+
 def test_armatures_are_read_as_they_are(tmp_path):
     """Negative control of the comparison above: without them the mass matrix is another."""
     hinges = {each.name: each for each in read(MODELS["armature of an actuator"], tmp_path).scene.hinges}
@@ -92,13 +118,9 @@ def test_what_is_left_out_is_said(tmp_path):
 
 
 BAD = {
-    "armature of a free joint": (
-        MJCF.replace('<freejoint name="float"/>', '<joint type="free" name="float" armature="0.1"/>'),
-        'the free or ball joint "float" has the armature 0.1',
-    ),
     "armature of a ball": (
         MJCF.replace('name="ball"', 'name="ball" armature="0.1"'),
-        'the free or ball joint "ball" has the armature 0.1',
+        'the ball joint "ball" has the armature 0.1',
     ),
     "armature at a tendon": (
         MJCF.replace(

@@ -183,7 +183,39 @@ def test_damping_is_that_of_the_hinge_and_friction_is_noted(kind, tmp_path):
     hinge = damped.scene.hinges[-1]
     coordinate = hinge.translation if kind == "prismatic" else hinge.rotation
     assert (coordinate.damping_Ns_m if kind == "prismatic" else coordinate.damping_Nms_rad) == 0.7
-    assert any(note.startswith("dry friction of joints is left out, add") for note in damped.notes)
+    assert "dry friction of joints is left out: j (--smoothing makes it a connector)" in damped.notes
+
+
+@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
+def test_limits_become_stops_and_friction_a_connector(kind, tmp_path):
+    """What the connectors push with is what their laws say: the stop pressed in by 0.1, friction at a high rate."""
+    limits = '<limit lower="-0.3" upper="0.2" effort="5" velocity="2"/><dynamics friction="0.2"/><axis'
+    text = SINGLE.replace('type="revolute"', f'type="{kind}"').replace("<axis", limits)
+    imported = read(text, tmp_path, stop_stiffness=50.0, smoothing=1e-3)
+    assert not any("limits" in note or "friction" in note for note in imported.notes)
+    friction, stop = imported.scene.connectors
+    assert (stop.name, friction.name, stop.hinge, friction.hinge) == ("j.stops", "j.friction", "j", "j")
+    system, apart = fm.compile(imported.scene), fm.compile(read(text, tmp_path).scene)
+    for place, rate, push in ((0.0, 4.0, -0.2), (0.3, 0.0, -5.0), (-0.4, 0.0, 5.0), (0.3, -4.0, -4.8)):
+        (found, M), (free, _) = (_along(each, place, rate) for each in (system, apart))
+        assert M * (found - free) == pytest.approx(push, rel=1e-6)
+    assert _along(system, 0.19, 0.0)[0] == pytest.approx(_along(apart, 0.19, 0.0)[0], rel=1e-12)  # within the limits
+
+
+def _along(system: fm.System, place: float, rate: float) -> tuple[float, float]:
+    """Acceleration and mass of the only coordinate."""
+    state = system.state(np.array([place]), np.array([rate]), 0.0)
+    return float(system.accelerations(state)[0]), float(system.mass_matrix(state)[0, 0])
+
+
+def test_joints_that_begin_beyond_their_limits_are_told(tmp_path):
+    text = SINGLE.replace("<axis", '<limit lower="0.1" upper="0.2"/><axis')
+    notes = read(text, tmp_path, stop_stiffness=50.0).notes
+    assert "joints begin beyond their limits, and are pushed back: j" in notes
+    with pytest.raises(ModelError, match="its limits are '0.3' and '0.2': give numbers in SI units, lower first"):
+        read(text.replace("0.1", "0.3"), tmp_path, stop_stiffness=50.0)
+    with pytest.raises(ValueError, match="stop_stiffness is 0: give a positive number"):
+        read(text, tmp_path, stop_stiffness=0.0)
 
 
 @pytest.mark.parametrize("losses", ['damping="-1"', 'damping="x"', 'friction="nan"'])
