@@ -87,13 +87,13 @@ class Result:
         if gap:
             return unknown(len(self.values(channel)), gap)
         ladder = [run for run in self._ladder() if run.status == "finished" and channel in run.channels]
-        size = self._sizes.magnitude(channel, finest.evaluations)
+        size, joints = self._sizes.magnitude(channel, finest.evaluations), self._sizes.joints
         if _without_effect(ladder):
             if not all(map(is_judged, finest.channels)) and self.rests:  # the run is about the linearised motion
-                return self._with_own(channel, at_rest(len(self.values(channel)), size, finest.evaluations))
+                return self._with_own(channel, at_rest(len(self.values(channel)), size, finest.evaluations, joints))
             ladder = ladder[-1:]
         rungs = [RungSignal(run.effort_value, self.values(channel, run), run.evaluations) for run in ladder]
-        return self._with_own(channel, estimate(channel, finest.effort_kind, rungs, size))
+        return self._with_own(channel, estimate(channel, finest.effort_kind, rungs, size, joints))
 
     @property
     def rests(self) -> bool:

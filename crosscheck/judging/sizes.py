@@ -55,8 +55,13 @@ class Sizes:
         Exact zeros have no rounding.
         """
         kin, of_scene = self._largest(magnitude, family(channel)), self._of_scene(channel)
-        rounding = max(LEAST_OF_SCENE * of_scene, roundoff_floor(of_scene, max(evaluations, 0)))
+        rounding = max(LEAST_OF_SCENE * of_scene, roundoff_floor(of_scene, max(evaluations, 0), self.joints))
         return of_scene if 0.0 < kin < rounding else kin
+
+    @kept
+    def joints(self) -> int:
+        """The most joints that the arithmetic of a channel passes: all that have loads, one at least."""
+        return max(1, len({name.rpartition(".")[0] for name in self.channels if name.startswith("load:")}))
 
     def _of_scene(self, channel: str) -> float:
         """The size (SI) of such a signal from the scene's other signals by dimensions; 0 if it does not follow."""

@@ -35,7 +35,13 @@ of these constants were found over the library of cases, see docs/verdicts.md.
 **Round-off.** Relative rounding errors of size eps and random sign in N evaluations add up to about eps sqrt(N) times
 the size of the signal (Henrici 1962); systematic growth beyond that shows in the differences. The size is that of the
 largest signal of the same family (all hinge torques, all positions): a backward-stable solve has errors relative to the
-norm of all unknowns.
+norm of all unknowns. A short run has few evaluations, and then the rounding of the arithmetic that makes a channel of a
+state counts for more, which is the same at all efforts: on its way past n joints a number takes part in `ROUNDINGS` n
+operations. By the probabilistic bound of Higham and Mary (2019) their rounding errors add up to at most
+
+    lambda sqrt(ROUNDINGS n) eps/2
+
+times the size, with a probability of 1 - 2 exp(-lambda^2/2) for each value: 1 - 3e-9 for lambda = `LIKELY`.
 
 **Rest.** Efforts that made as many evaluations and gave the same result in every channel were ignored by the engine,
 and tell nothing. Derivatives of a state that rests are the exception: where nothing moves, every effort has that state.
@@ -68,6 +74,8 @@ NO_GROWTH = 1.03  # ratio of the evaluations at two tolerances
 EXCESS_GROWTH = 1.5  # ratio of the logarithm of that ratio to the one expected from the coarser pair
 ORDER_CREDIT = 4.0
 LARGEST_ORDER = 16.0
+ROUNDINGS = 17  # an entry of a joint's rotation 3, composed with the one before 5, an arm turned 5, added 1, a moment 3
+LIKELY = 6.4
 LARGEST_RATIO = 1e6  # of two steps between which an order is estimated
 
 
@@ -98,25 +106,25 @@ def unknown(samples: int, why: str) -> Uncertainty:
     return Uncertainty(np.full(samples, np.inf), float("inf"), f"unknown: {why}")
 
 
-def at_rest(samples: int, size: float, evaluations: int) -> Uncertainty:
+def at_rest(samples: int, size: float, evaluations: int, joints: int = 0) -> Uncertainty:
     """That of a state which rests, and is the same at every effort: round-off of signals of that size."""
     if not (0.0 <= size < np.inf and 0 <= evaluations < np.inf):
         return unknown(samples, f"{evaluations} evaluations of a signal of size {size:g} leave no round-off to be told")
-    floor = roundoff_floor(size, max(evaluations, samples))
+    floor = roundoff_floor(size, max(evaluations, samples), joints)
     return Uncertainty(np.full(samples, floor), floor, "the state rests at every effort")
 
 
-def estimate(channel: str, kind: str, rungs: Sequence[RungSignal], size: float) -> Uncertainty:
+def estimate(channel: str, kind: str, rungs: Sequence[RungSignal], size: float, joints: int = 0) -> Uncertainty:
     """U of the finest of `rungs` (coarse to fine, all of one method; `kind` is "step" or "tolerance").
 
-    The last three are used, of tolerances the last four. `size` is the magnitude of the signal's family. Never raises:
-    U is infinite if it cannot be estimated.
+    The last three are used, of tolerances the last four. `size` is the magnitude of the signal's family, `joints`
+    how many its arithmetic passes at most. Never raises: U is infinite if it cannot be estimated.
     """
     samples = len(rungs[-1].values) if rungs else 0
     fault = _fault(kind, rungs, size)
     if fault:
         return unknown(samples, fault)
-    floor = roundoff_floor(size, max(rungs[-1].evaluations, samples))
+    floor = roundoff_floor(size, max(rungs[-1].evaluations, samples), joints)
     gaps = [distance(channel, coarse.values, fine.values) for coarse, fine in pairwise(rungs[-RUNGS:])]
     if len(gaps) == 1:
         return _enveloped(UNPROVEN_SAFETY, gaps[0], floor, "3 x the difference of the only two efforts", None)
@@ -153,9 +161,10 @@ def _enveloped(factor: float, gap: Real, floor: float, how: str, order: float | 
     return Uncertainty(envelope, float(envelope[-1]), how, order)
 
 
-def roundoff_floor(size: float, evaluations: int) -> float:
-    """eps sqrt(N) times the size of the signals."""
-    return float(np.finfo(np.float64).eps * np.sqrt(float(min(evaluations, MOST_COUNTED))) * size)
+def roundoff_floor(size: float, evaluations: int, joints: int = 0) -> float:
+    """eps sqrt(N) times the size of the signals, and the rounding of arithmetic that passes so many joints."""
+    in_steps, in_channel = np.sqrt(float(min(evaluations, MOST_COUNTED))), 0.5 * LIKELY * np.sqrt(ROUNDINGS * joints)
+    return float(np.finfo(np.float64).eps * (in_steps + in_channel) * size)
 
 
 def spatial(channel: str, coarse: Real, fine: Real, ratio: float, order: float) -> Real:

@@ -8,11 +8,16 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
 from scipy.special import ellipj, ellipk
 
+from crosscheck.judging.results import collect
+from crosscheck.judging.sizes import Sizes
 from crosscheck.judging.uncertainty import RungSignal, estimate, observed_order, roundoff_floor, spatial, unknown
-from crosscheck.judging.verdict import conserve
+from crosscheck.judging.verdict import Signal, compare, conserve
+from crosscheck.records.kinds import CaseRecord
 from flexmb.typing import Real
+from tests.crosscheck.made_records import ONE_PAIR, ladder, run_file
 
 CHANNEL = "marker:tip.velocity"
 SAMPLES = 100
@@ -205,6 +210,58 @@ def test_equal_runs_keep_the_roundoff_floor() -> None:
     rungs = [RungSignal(10.0**-n, signal(1.0), 400) for n in (8, 9, 10)]
     eps = np.finfo(float).eps
     assert estimate(CHANNEL, "tolerance", rungs, 2.0).value == pytest.approx(2.0 * 20.0 * eps)
+
+
+@pytest.mark.parametrize("joints", [2, 10, 100, 1000])
+def test_arithmetic_past_joints_rounds_within_its_bound(joints: int) -> None:
+    """Places at the end of random chains, summed from the base and from the tip: both are off by their rounding."""
+    worst, rng = 0.0, np.random.default_rng(joints)
+    for _ in range(10):
+        turns = Rotation.random(joints, random_state=rng).as_matrix()
+        arms = rng.normal(size=(joints, 3)) / np.sqrt(joints)
+        place, R = np.zeros(3), np.eye(3)
+        for turn, arm in zip(turns, arms, strict=True):
+            R = R @ turn
+            place = place + R @ arm
+        seen = np.zeros(3)
+        for turn, arm in zip(turns[::-1], arms[::-1], strict=True):
+            seen = turn @ (seen + arm)
+        size = max(np.linalg.norm(place), 1.0)
+        worst = max(worst, np.linalg.norm(place - seen) / (2.0 * roundoff_floor(size, 0, joints)))
+    assert 0.01 <= worst <= 1.0  # it is neither exceeded nor idle
+
+
+def test_rounding_of_a_channel_is_none_of_its_differences() -> None:
+    """Two engines of 121 evaluations whose runs are equal to the last digit at all tolerances, each its own way."""
+    wave = 0.5 * np.sin(np.linspace(0.0, 6.0, 101))[:, None] * np.ones(3)
+    size = float(np.max(np.linalg.norm(wave, axis=1)))
+
+    def status(apart: float, joints: int) -> str:
+        sides = []
+        for values in (wave, wave * (1.0 + apart)):
+            rungs = [RungSignal(10.0**-n, values, count) for n, count in ((6, 101), (8, 111), (10, 121))]
+            doubt = estimate("load:a.force", "tolerance", rungs, size, joints)
+            sides.append(Signal(values, doubt, (2.0 * size, 0.0)))
+        return compare("load:a.force", *sides, goal=1e-5).status
+
+    eps = np.finfo(float).eps
+    assert status(31.0 * eps, 3) == "agree"
+    assert status(31.0 * eps, 0) == "differ"  # what rounding in the steps alone excuses
+    assert status(1e-9, 3) == status(1e-12, 3) == "differ"
+
+
+def test_a_result_counts_the_joints_that_it_has_loads_of() -> None:
+    names = [f"load:{name}.{part}" for name in ("a", "b.c", "d") for part in ("force", "torque")]
+    few, more = ({name: np.ones((11, 3)) for name in kept} for kept in (names[:2], [*names, CHANNEL]))
+    counted = [Sizes(tuple(each), each.__getitem__).joints for each in (few, more, {CHANNEL: np.ones((11, 3))})]
+    assert counted == [1, 3, 1]
+    runs = [ladder("one", each, spread=0.0) for each in (few, more)]
+    for at, run in enumerate(runs):  # evaluations differ between the efforts, so that equal results say something
+        (result,) = collect(
+            [CaseRecord(case="made/made", run=run_file(ONE_PAIR), provenance=None, readme="", variants={}), *run]
+        ).cases[0].results.values()
+        expected = roundoff_floor(np.sqrt(3.0), 300, counted[at])
+        assert result.uncertainty(names[0]).value == pytest.approx(expected, rel=1e-12)
 
 
 def test_envelope_never_falls() -> None:
