@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -19,6 +18,7 @@ from crosscheck.judging.results import Result, collect
 from crosscheck.judging.uncertainty import Uncertainty, roundoff_floor
 from crosscheck.library import basis
 from crosscheck.library.case import CaseError, Comparison, ComparisonSide, Variant
+from crosscheck.library.code import function_of
 from crosscheck.library.find import Case
 from crosscheck.library.recipe import ReferenceRecipe, ReferenceRoute
 from crosscheck.records.archive import read
@@ -28,7 +28,6 @@ from crosscheck.running.plan import jobs_at, plan
 from crosscheck.running.scheduler import Limits, Scheduler
 from crosscheck.running.sweep import Listener, run_planned
 from flexmb.run.channels import family, magnitude, matches
-from flexmb.scene.user_code import user_code_is_forbidden
 from flexmb.typing import Real
 
 
@@ -202,17 +201,4 @@ def _of_file(file: Path, route: ReferenceRoute, times: Real) -> RouteSignals:
 
 
 def _function(file: Path) -> Callable[[Real], Mapping[str, Real]]:
-    if user_code_is_forbidden():
-        raise CaseError(f"{file}: it is code, and user code was forbidden: read it, then run without --no-user-code")
-    spec = spec_from_file_location(f"closed form of {file.parent.name}", file)
-    if spec is None or spec.loader is None or not file.is_file():
-        raise CaseError(f"{file}: there is no such Python file, and a route of [reference] names it")
-    module = module_from_spec(spec)
-    try:
-        spec.loader.exec_module(module)
-    except Exception as error:  # the file is anybody's
-        raise CaseError(f"{file}: it cannot be loaded: {type(error).__name__}: {error}") from None
-    function: Callable[[Real], Mapping[str, Real]] | None = getattr(module, "exact", None)
-    if function is None:
-        raise CaseError(f"{file}: it has no function exact(times): add one that returns channels by name")
-    return function
+    return function_of(file, "exact", "times", "channels by name", "a route of [reference] names it")

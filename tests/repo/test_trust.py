@@ -25,7 +25,7 @@ PLACES = {
     "flexmb/jit/numbered.py": "text of flexmb's own", "flexmb/jit/stored.py": "compiled kernels",
     "flexmb/run/beside.py": "flexmb's own warming up, for a scene without laws of users",
     "crosscheck/engines/registry.py": "built-in engines, plug-ins, and what a caller in Python names, never a file",
-    "crosscheck/references/routes.py": "exact.py of a case, by crosscheck regenerate",
+    "crosscheck/library/code.py": "files beside a case, by crosscheck regenerate, and model.py, by crosscheck validate",
     "crosscheck/stability/catalogue.py": "maps of crosscheck's own",
     "crosscheck/stability/run.py": "what gives the maps: named by a caller in Python, never by a file",
 }  # fmt: skip

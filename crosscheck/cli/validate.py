@@ -1,0 +1,87 @@
+"""`crosscheck validate`: predictions against measurements."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from crosscheck.cli.common import Json, NoUserCode, Verbose, app, console, in_one_line, print_json
+
+
+def _complete_set(begun: str) -> list[str]:
+    from crosscheck.validation.measured_set import shipped_sets  # it reads the names of sets, of nothing else
+
+    return [name for name in shipped_sets() if name.startswith(begun)]
+
+
+@app.command()
+def validate(
+    sets: Annotated[
+        list[str],
+        typer.Argument(
+            help="Names of measured sets, `all`, `list` to see which there are, or folders with a measured.toml.",
+            autocompletion=_complete_set,
+        ),
+    ],
+    samples: Annotated[
+        int, typer.Option(min=0, max=10_000, help="Draw all inputs so many times, beside the first-order budget.")
+    ] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the samples.")] = 0,
+    verbose: Verbose = False,
+    as_json: Json = False,
+    no_user_code: NoUserCode = False,
+) -> None:
+    """
+    Hold predictions against measured data, with a budget of uncertainty for every point (after ASME V&V 20).
+
+    A point's error is E = S - D, prediction less reading. Its validation uncertainty u_val is the root of the sum of
+    squares of three standard deviations: of the numbers (u_num, by refinement), of the inputs (u_input, by the
+    derivatives of the prediction) and of the reading (u_D). It is within if |E| is at most 2 u_val. A series with 19 of
+    20 points within is *validated within u_val*; otherwise its model is wrong by what is shown. `--verbose` has every
+    point, and which input its uncertainty comes from. `--samples 200` draws the inputs and shows how far u_input, which
+    is of first order, is from the deviation of the samples.
+
+    A set is a folder with `measured.toml`, `points.csv` and `model.py`; `docs/validation.md` says what they hold.
+
+    **Exit code**: 0 every series came out as its file says; 1 one did not; 2 there is no such set, or its files or its
+    model are wrong.
+
+    **Examples**: `crosscheck validate list` · `crosscheck validate composite_strips --verbose` ·
+    `crosscheck validate all --json`
+    """
+    with in_one_line():
+        from crosscheck.terminal.measured import points_table, series_table, sets_table, told_progress
+        from crosscheck.validation.budget import budget
+        from crosscheck.validation.document import document
+        from crosscheck.validation.measured_set import find_set, shipped_sets
+
+        chosen = [find_set(name) for name in (shipped_sets() if sets in (["all"], ["list"]) else dict.fromkeys(sets))]
+        if sets == ["list"]:
+            if as_json:
+                print_json({each.name: {"title": each.content.title, "points": len(each.points)} for each in chosen})
+            else:
+                console.print(sets_table(chosen))
+            return
+        budgets = []
+        for measured in chosen:
+            with told_progress(console, measured.name) as listener:
+                budgets.append(budget(measured, samples, seed, listener))
+            console.print(series_table(budgets[-1]))
+            if verbose:
+                console.print(points_table(budgets[-1]))
+    verdicts = [verdict for of_set in budgets for verdict in of_set.verdicts()]
+    wrong = [verdict for verdict in verdicts if not verdict.ok]
+    points = sum(verdict.points for verdict in verdicts)
+    within = sum(verdict.within for verdict in verdicts)
+    console.print(
+        f"{within} of {points} points are within their uncertainty; "
+        + (
+            f"{len(wrong)} of {len(verdicts)} series are not as their files say"
+            if wrong
+            else f"all {len(verdicts)} series are as their files say"
+        )
+    )
+    if as_json:
+        print_json({of_set.of.name: document(of_set) for of_set in budgets})
+    raise typer.Exit(1 if wrong else 0)

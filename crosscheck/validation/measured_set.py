@@ -1,0 +1,249 @@
+"""A measured set: published readings, what they were read from, and the program that predicts them.
+
+A folder holds `measured.toml` (source, inputs and series), `points.csv` (the readings) and `model.py` with
+
+    predict(points, inputs, effort) -> one number for each point, in the unit of its series
+
+`points` is a tuple of `Point`, `inputs` a dict of the values of all inputs by name, and `effort` 0 or 1: the numerical
+error at 1 is to be several times smaller, by more modes or polynomials or by a tighter integration.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite, sqrt
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Literal, TypeVar
+
+import msgspec
+
+from crosscheck.library.case_error import CaseError
+from crosscheck.library.code import function_of
+from crosscheck.library.find import shipped_folder
+from flexmb.scene.convert import to_struct
+from flexmb.scene.problems import SceneError, closest
+from flexmb.scene.reading import Unreadable, parse_toml, read_text
+
+FILE, POINTS, MODEL = "measured.toml", "points.csv", "model.py"
+SERIES, MEASURED = "series", "measured"  # columns of points.csv; all others are conditions
+MOST_POINTS = 100_000
+
+Width = Literal["standard", "limits"]
+Standing = Literal["validated", "model error"]
+
+
+class Input(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A number that the prediction takes from the source, and how well it is known.
+
+    `width` is a standard deviation, or half the distance of limits between which all values are equally likely.
+    `stated` says whether the source has it; otherwise it is declared here, and `why` has the reason.
+    """
+
+    name: str
+    value: float
+    width: float
+    kind: Width = "standard"
+    unit: str = ""
+    stated: bool
+    why: str
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation, in the unit of the input."""
+        return self.width if self.kind == "standard" else self.width / sqrt(3.0)
+
+
+class Series(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Points of one kind: their unit, the standard deviation of a reading, and what is known to come out.
+
+    The deviation of a reading is `reading` + `relative` times its size. `expect` is "validated" if at least 19 of 20
+    points are within their expanded uncertainty, and `within` bounds the largest error, relative to `size` (by
+    default the largest reading of the series).
+    """
+
+    name: str
+    what: str
+    unit: str
+    reading: float = 0.0
+    relative: float = 0.0
+    stated: bool
+    why: str
+    expect: Standing
+    within: float
+    size: float | None = None
+    reason: str = ""
+
+
+class MeasuredFile(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What `measured.toml` holds. `fitted` says which numbers of the model were fitted to these very readings."""
+
+    title: str
+    physics: str
+    sources: tuple[str, ...]
+    read_from: str
+    instrument: str
+    licence: str
+    digitised: str
+    fitted: str
+    left_out: str
+    inputs: tuple[Input, ...] = ()
+    series: tuple[Series, ...] = ()
+
+
+@dataclass(frozen=True)
+class Point:
+    """A reading: its series, the conditions at which it was taken, and its value in the unit of the series."""
+
+    series: str
+    conditions: Mapping[str, float]
+    measured: float
+
+
+Predict = Callable[[Sequence[Point], Mapping[str, float], int], Sequence[float]]
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class MeasuredSet:
+    """A folder that was read and checked; `name` is that of the folder."""
+
+    name: str
+    folder: Path
+    content: MeasuredFile
+    points: tuple[Point, ...]
+
+    def series(self, name: str) -> Series:
+        """The series of that name."""
+        return next(series for series in self.content.series if series.name == name)
+
+    def deviation(self, point: Point) -> float:
+        """Standard deviation of a reading, in the unit of its series."""
+        series = self.series(point.series)
+        return series.reading + series.relative * abs(point.measured)
+
+    @property
+    def nominal(self) -> dict[str, float]:
+        """The inputs as the source has them."""
+        return {given.name: given.value for given in self.content.inputs}
+
+    def predict(self) -> Predict:
+        """The function of `model.py`; CaseError if there is none, or if user code is forbidden."""
+        takes, gives = "points, inputs, effort", "a number for each point"
+        return function_of(self.folder / MODEL, "predict", takes, gives, "it predicts the points")
+
+
+def measured_folder() -> Path:
+    """The folder of the shipped sets."""
+    return shipped_folder() / "measured"
+
+
+def shipped_sets() -> tuple[str, ...]:
+    """Names of the shipped sets; none of their files is read."""
+    return tuple(file.parent.name for file in sorted(measured_folder().glob(f"*/{FILE}")))
+
+
+def find_set(word: str) -> MeasuredSet:
+    """A shipped set by its name, or a folder that holds a `measured.toml`; CaseError names file, place and remedy."""
+    if (Path(word) / FILE).is_file():
+        return read_set(Path(word))
+    known = shipped_sets()
+    if word not in known:
+        raise CaseError(
+            f'"{word}" is no measured set and no folder with a {FILE}: {closest(word, known)}; '
+            "`crosscheck validate list` shows them"
+        )
+    return read_set(measured_folder() / word)
+
+
+def read_set(folder: Path) -> MeasuredSet:
+    """Read and check a folder; CaseError names file, place and remedy."""
+    folder = folder.resolve()
+    content = _content(folder / FILE)
+    points = _points(folder / POINTS, content)
+    return MeasuredSet(folder.name, folder, content, points)
+
+
+def _text(file: Path) -> str:
+    try:
+        return read_text(file)
+    except (OSError, Unreadable) as error:
+        raise CaseError(f"{file}: {error}") from None
+
+
+def _content(file: Path) -> MeasuredFile:
+    try:
+        content = to_struct(parse_toml(_text(file)), MeasuredFile, str(file))
+    except SceneError as error:  # its message would call the file a scene
+        raise CaseError(f"{file}: {'; '.join(map(str, error.problems))}") from None
+    except (Unreadable, RecursionError, OverflowError) as error:
+        raise CaseError(f"{file}: {error}") from None
+    for kind, items in (("input", content.inputs), ("series", content.series)):
+        names = [item.name for item in items]
+        for name in names:
+            if names.count(name) > 1:
+                raise CaseError(f'{file}: {kind} "{name}" is there twice: rename one')
+    if not content.series:
+        raise CaseError(f"{file}: there is no series: add [[series]]")
+    for given in content.inputs:
+        _refuse(file, f'input "{given.name}"', given, {"width": given.width}, ("value",))
+    for series in content.series:
+        sizes = {"reading": series.reading, "relative": series.relative}
+        _refuse(file, f'series "{series.name}"', series, sizes, ())
+        if series.reading == series.relative == 0.0:
+            raise CaseError(f'{file}: series "{series.name}" has exact readings: give reading or relative')
+        if not 0.0 < series.within < float("inf") or not (series.size is None or 0.0 < series.size < float("inf")):
+            raise CaseError(f'{file}: series "{series.name}": within and size are positive numbers')
+        if series.expect == "model error" and not series.reason:
+            raise CaseError(f'{file}: series "{series.name}" expects a model error: say why in reason')
+    return content
+
+
+def _refuse(file: Path, where: str, item: Any, sizes: Mapping[str, float], finite: tuple[str, ...]) -> None:
+    for key, value in sizes.items():
+        if not 0.0 <= value < float("inf"):
+            raise CaseError(f"{file}: {where}: {key} is {value:g}: give a number from 0")
+    for key in finite:
+        if not isfinite(getattr(item, key)):
+            raise CaseError(f"{file}: {where}: {key} is {getattr(item, key):g}: give a finite number")
+
+
+def _points(file: Path, content: MeasuredFile) -> tuple[Point, ...]:
+    rows = csv.reader(io.StringIO(_text(file)))
+    head = next(rows, [])
+    if len(set(head)) < len(head) or not {SERIES, MEASURED} <= set(head):
+        raise CaseError(f"{file}: line 1: the columns {SERIES} and {MEASURED} are needed, each column once")
+    known = [series.name for series in content.series]
+    points = list[Point]()
+    for line, row in enumerate(rows, 2):
+        if len(row) != len(head):
+            raise CaseError(f"{file}: line {line} has {len(row)} columns, and line 1 has {len(head)}")
+        if len(points) == MOST_POINTS:
+            raise CaseError(f"{file}: line {line}: there are more than {MOST_POINTS} points: leave some out")
+        cells = dict(zip(head, row, strict=True))
+        if cells[SERIES] not in known:
+            raise CaseError(
+                f'{file}: line {line}: series "{cells[SERIES]}" is not in {FILE}: {closest(cells[SERIES], known)}'
+            )
+        numbers = {key: _number(file, line, key, text) for key, text in cells.items() if key != SERIES and text.strip()}
+        if MEASURED not in numbers:
+            raise CaseError(f"{file}: line {line}: there is no reading: leave the line out")
+        measured = numbers.pop(MEASURED)
+        points.append(Point(cells[SERIES], MappingProxyType(numbers), measured))
+    for name in known:
+        if not any(point.series == name for point in points):
+            raise CaseError(f'{file}: series "{name}" has no point: leave it out of {FILE}')
+    return tuple(points)
+
+
+def _number(file: Path, line: int, key: str, text: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = float("nan")
+    if not isfinite(number):
+        raise CaseError(f'{file}: line {line}: {key} is "{text}": give a finite number')
+    return number

@@ -1,0 +1,32 @@
+"""The table of docs/validation.md: every shipped set is predicted anew, which takes some minutes. Write it with
+
+python -m tests.repo.validation
+"""
+
+from collections.abc import Iterator
+
+from crosscheck.validation.budget import budget
+from crosscheck.validation.measured_set import find_set, shipped_sets
+from tests.repo.project import ROOT
+
+PAGE = ROOT / "docs" / "validation.md"
+START, END = "<!-- measured: written by python -m tests.repo.validation -->\n", "<!-- end -->"
+
+
+def table() -> Iterator[str]:
+    """One line for each series."""
+    yield "| set | series | verdict | within | rms | largest | u_val |"
+    yield "|---|---|---|---|---|---|---|"
+    for name in shipped_sets():
+        for verdict in budget(find_set(name)).verdicts():
+            standing = "validated within u_val" if verdict.standing == "validated" else "model error"
+            why = f": {verdict.series.reason}" if verdict.standing == "model error" else ""
+            sizes = " | ".join(f"{size:.1%}" for size in (verdict.rms, verdict.largest, verdict.u_val))
+            within = f"{verdict.within} of {verdict.points}"
+            yield f"| `{name}` | {verdict.series.name} | {standing}{why} | {within} | {sizes} |"
+
+
+if __name__ == "__main__":
+    before, _, rest = PAGE.read_text(encoding="utf-8").partition(START)
+    lines = "".join(f"{line}\n" for line in table())
+    PAGE.write_text(before + START + lines + END + rest.partition(END)[2], encoding="utf-8")
