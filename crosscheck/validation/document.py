@@ -16,8 +16,8 @@ def document(budget: Budget) -> dict[str, Any]:
         "series": [
             {
                 "name": verdict.series.name, "unit": verdict.series.unit, "standing": verdict.standing,
-                "ok": verdict.ok, "fault": verdict.fault, "points": verdict.points, "within": verdict.within, "rms": verdict.rms,
-                "largest": verdict.largest, "u_val": verdict.u_val,
+                "ok": verdict.ok, "fault": verdict.fault, "points": verdict.points, "within": verdict.within,
+                "rms": verdict.rms, "largest": verdict.largest, "u_val": verdict.u_val,
             }
             for verdict in budget.verdicts()
         ],

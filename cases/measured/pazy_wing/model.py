@@ -72,7 +72,9 @@ def wing(skin, behind, bending, twist, effort):
         for x, (m, aft, along, up, chord, span, vertical) in zip(PLACES, table("lumps.csv", skin), strict=True)
     ]  # fmt: skip
     b = fm.SceneBuilder(
-        "Pazy wing", gravity=(0, 0, -G), allow=("wave_speed", "many_elements", "thick_section", "shear_stiffness")
+        "Pazy wing",
+        gravity=(0, 0, -G),
+        allow=("wave_speed", "many_elements", "thick_section", "shear_stiffness", "uncut_beam"),
     )
     b.beam(
         "wing", length=SPAN, elements=15, section=stations, level="exact", tip_masses=lumps,
