@@ -128,7 +128,7 @@ def budget(of: MeasuredSet, samples: int = 0, seed: int = 0, listener: Listener 
 
     def at(changes: Mapping[str, float], effort: int) -> Real:
         nonlocal done
-        values = _predicted(of, predict, points, nominal | changes, effort)
+        values = _predicted(of, predict, points, nominal | dict(changes), effort)
         listener(done := done + 1, total)
         return values
 
