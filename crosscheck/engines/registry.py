@@ -32,6 +32,7 @@ BUILT_IN = {
     "drake": "crosscheck.engines.drake:DrakeEngine",
     "dart": "crosscheck.engines.dart:DartEngine",
     "basilisk": "crosscheck.engines.basilisk:BasiliskEngine",
+    "opensim": "crosscheck.engines.opensim:OpensimEngine",
 }
 OWN_CODE = tuple(name for name, place in BUILT_IN.items() if place.startswith("crosscheck.engines.native:"))
 # For each engine the one whose library or compiled code it shares: both run in the same worker process.

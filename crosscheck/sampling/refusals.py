@@ -29,6 +29,7 @@ BESIDE = {
     "pinocchio": SCIPY,
     "dart": SCIPY,
     "basilisk": SCIPY,
+    "opensim": SCIPY,
     "mujoco": ("RK4", "Euler", "implicit", "implicitfast"),
     "exudyn": (
         "TrapezoidalIndex2", "GeneralizedAlpha", "ExplicitEuler", "ExplicitMidpoint", "RK33", "RK44", "RK67", "ODE23",

@@ -184,7 +184,7 @@ def test_an_engine_without_derivatives_is_asked_for_them() -> None:
     assert found[0].offer == "give derivatives by_displacement where a run asks for them"
 
 
-@pytest.mark.parametrize("name", ["native", "pinocchio", "mujoco", "exudyn", "drake"])
+@pytest.mark.parametrize("name", ["native", "pinocchio", "mujoco", "exudyn", "drake", "opensim"])
 def test_engines_keep_the_clauses_on_derivatives(name: str) -> None:
     found = [try_clause(engine(name), clause) for clause in LINEARISED.clauses]
     if "missing" in {each.status for each in found}:

@@ -109,7 +109,7 @@ def test_the_small_adapter_keeps_the_whole_contract() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["native", "pinocchio", "mujoco", "exudyn", "drake", "dart"])
+@pytest.mark.parametrize("name", ["native", "pinocchio", "mujoco", "exudyn", "drake", "dart", "opensim"])
 def test_engines_keep_the_clauses_on_trees(name: str) -> None:
     found = [try_clause(engine(name), clause) for clause in TREES.clauses]
     if "missing" in {each.status for each in found}:

@@ -12,6 +12,7 @@ import pytest
 
 import flexmb as fm
 from crosscheck.engines.contract import Effort, Run
+from crosscheck.engines.opensim.engine import CLOSED_BY
 from crosscheck.engines.registry import engine
 from crosscheck.mutation.invariances import units
 from crosscheck.running import starts
@@ -65,8 +66,11 @@ def off(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> float:
     return max(float(np.max(np.abs(one[name] - other[name]))) for name in one) / size
 
 
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("name", ["pinocchio", "exudyn"])
+CLOSED = [(name, kind) for name in ("pinocchio", "exudyn") for kind in KINDS]
+CLOSED += [("opensim", kind) for kind in CLOSED_BY]
+
+
+@pytest.mark.parametrize(("name", "kind"), CLOSED)
 def test_every_kind_has_the_same_loads(name: str, kind: ClosureKind) -> None:
     """Before, Pinocchio closed loops by welds and ball joints only, and neither beside a drive nor beside couplings."""
     pytest.importorskip(name)
@@ -81,12 +85,14 @@ def test_every_kind_has_the_same_loads(name: str, kind: ClosureKind) -> None:
         assert off(*({"tip": each.markers["tip"].acceleration} for each in (mine, theirs))) <= 1e-11
 
 
-@pytest.mark.parametrize("kind", ["universal", "planar"])
-def test_pinocchio_keeps_them_over_time(kind: ClosureKind) -> None:
-    pytest.importorskip("pinocchio")
+@pytest.mark.parametrize(
+    ("name", "kind"), [("pinocchio", "universal"), ("pinocchio", "planar"), ("opensim", "spherical")]
+)
+def test_they_are_kept_over_time(name: str, kind: ClosureKind) -> None:
+    pytest.importorskip(name)
     scene, run = loop(kind), Run(np.linspace(0.0, 0.3, 4))
     mine = engine("native").compile(scene).simulate(run, Effort("tolerance", 1e-11, "dop853"))
-    theirs = engine("pinocchio").compile(scene).simulate(run, Effort("tolerance", 1e-11, "DOP853"))
+    theirs = engine(name).compile(scene).simulate(run, Effort("tolerance", 1e-11, "DOP853"))
     assert np.max(np.abs(mine.markers["tip"].position - theirs.markers["tip"].position)) <= 1e-9
     assert off(mine.loads, theirs.loads) <= 1e-8
 
@@ -226,3 +232,9 @@ def test_rows_that_only_seem_redundant_are_told(size: float) -> None:
     scene, run = pinned(1.0, 1.0, 1.0, 1.0, (0.0, 0.0, 0.0), size), Run(np.linspace(0.0, 0.5, 6))
     found = engine("exudyn").compile(scene).simulate(run, Effort("step", 1e-3, "TrapezoidalIndex2"))
     assert found.status == "diverged" and 'closure "loop" opened: rows that are redundant' in found.message
+
+
+def test_opensim_refuses_the_kinds_that_simbody_has_not() -> None:
+    for kind in set(KINDS) - set(CLOSED_BY):
+        support = engine("opensim").supports(loop(kind))
+        assert support.kind == "no" and f'"loop" is of type {kind}' in support.reason

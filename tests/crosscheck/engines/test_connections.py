@@ -20,7 +20,9 @@ from flexmb.surrogate import modal_points
 
 CASES = Path(__file__).parents[3] / "cases"
 CASE, ANDREWS = (CASES / case / "scene.toml" for case in ("connectors/sprung_platform", "closed_chains/andrews"))
-WITHIN = {"native-composite": 1e-12, "pinocchio": 1e-12, "mujoco": 1e-11, "drake": 1e-11, "exudyn": 1e-10}
+WITHIN = {
+    "native-composite": 1e-12, "pinocchio": 1e-12, "mujoco": 1e-11, "drake": 1e-11, "exudyn": 1e-10, "opensim": 1e-12,
+}  # fmt: skip
 LIBRARY = {"native-composite": "flexmb", "drake": "pydrake"}
 
 

@@ -1,4 +1,4 @@
-"""Couplings in other codes: in Pinocchio to rounding, in MuJoCo softly, elsewhere refused by name."""
+"""Couplings in other codes: in Pinocchio and OpenSim to rounding, in MuJoCo softly, elsewhere refused by name."""
 
 import msgspec
 import numpy as np
@@ -44,14 +44,14 @@ def off(ours: dict, theirs: dict) -> float:
     return max(float(np.max(np.abs(ours[name] - theirs[name]))) for name in ours) / size
 
 
-@pytest.mark.parametrize("armed", [True, False])
+@pytest.mark.parametrize(("name", "armed"), [("pinocchio", True), ("pinocchio", False), ("opensim", False)])
 @pytest.mark.parametrize("driven", [True, False])
-def test_pinocchio_at_the_first_instant(driven, armed):
+def test_the_first_instant(driven, name, armed):
     """`armed`: coordinates have armatures too, as the motors behind gears do."""
-    pytest.importorskip("pinocchio")
+    pytest.importorskip(name)
     scene = with_armatures(machine(driven), 3) if armed else machine(driven)
-    assert CheckedEngine(engine("pinocchio")).supports(scene).kind == "exact"
-    ours, theirs = (engine(each).compile(scene).evaluate() for each in ("native", "pinocchio"))
+    assert CheckedEngine(engine(name)).supports(scene).kind == "exact"
+    ours, theirs = (engine(each).compile(scene).evaluate() for each in ("native", name))
     tips = [{"tip": each.markers["tip"].acceleration} for each in (ours, theirs)]
     assert off(*tips) <= 1e-12
     assert off(ours.loads, theirs.loads) <= 1e-12
@@ -60,11 +60,12 @@ def test_pinocchio_at_the_first_instant(driven, armed):
         assert off(ours.drives, theirs.drives) <= 1e-12
 
 
-def test_pinocchio_over_time():
-    pytest.importorskip("pinocchio")
+@pytest.mark.parametrize("name", ["pinocchio", "opensim"])
+def test_over_time(name):
+    pytest.importorskip(name)
     scene, run = machine(True), Run(np.linspace(0.0, 0.5, 6))
     ours = engine("native").compile(scene).simulate(run, Effort("tolerance", 1e-11, "dop853"))
-    theirs = engine("pinocchio").compile(scene).simulate(run, Effort("tolerance", 1e-11, "DOP853"))
+    theirs = engine(name).compile(scene).simulate(run, Effort("tolerance", 1e-11, "DOP853"))
     assert np.max(np.abs(ours.markers["tip"].position - theirs.markers["tip"].position)) <= 1e-9
     assert off(ours.loads, theirs.loads) <= 1e-8
     assert np.max(np.abs(ours.work - theirs.work)) <= 1e-8 * np.max(np.abs(ours.work))
@@ -102,7 +103,7 @@ def test_mujoco_keeps_them_softly():
 @pytest.mark.parametrize("name", [name for name in BUILT_IN if not name.startswith("native")])
 def test_others_refuse_them_by_name(name):
     support = CheckedEngine(engine(name)).supports(machine(False))
-    assert support.kind == {"pinocchio": "exact", "mujoco": "surrogate"}.get(name, "no")
+    assert support.kind == {"pinocchio": "exact", "opensim": "exact", "mujoco": "surrogate"}.get(name, "no")
     alone = engine(name).supports(machine(False))
     assert alone.kind == support.kind
     assert alone.kind != "no" or "three" in alone.reason or "with a beam" in alone.reason

@@ -33,7 +33,7 @@ from tests.trees import with_armatures
 TIMES = np.array([0.0, 1e-6])
 KNOWN = {
     "native": 1e-10, "pinocchio": 1e-10, "drake": 1e-10, "mujoco": 1e-5, "native-composite": 1e-5,
-    "native-frisch": 1e-5,
+    "native-frisch": 1e-5, "opensim": 1e-5,
 }  # fmt: skip
 """The largest error of a derivative, relative to its size, that an engine may claim of these well conditioned trees."""
 OTHERS = [name for name in KNOWN if name != "native"]

@@ -104,7 +104,7 @@ def test_rigid_variants_of_the_cases(path, name):
     compare_rigid(randomise(rigidify(shipped(path)), np.random.default_rng(0)), name)
 
 
-@pytest.mark.parametrize("name", ["pinocchio", "mujoco", "drake", "dart"])
+@pytest.mark.parametrize("name", ["pinocchio", "mujoco", "drake", "dart", "opensim"])
 @pytest.mark.parametrize(("kind", "seed"), RANDOM)
 @pytest.mark.filterwarnings("ignore:.*Inertia matrix is too close")
 def test_rigid_variants_of_random_flexible_trees(kind, seed, name):
@@ -112,7 +112,7 @@ def test_rigid_variants_of_random_flexible_trees(kind, seed, name):
     compare_rigid(rigidify(trees.random_scene(seed, recipe)), name)
 
 
-@pytest.mark.parametrize("name", ["pinocchio", "mujoco", "drake", "dart"])
+@pytest.mark.parametrize("name", ["pinocchio", "mujoco", "drake", "dart", "opensim"])
 @pytest.mark.parametrize("seed", range(2))
 def test_finite_segments_of_a_beam(seed, name):
     """Sixteen stiff segments: a surrogate is a rigid tree like any other."""

@@ -266,7 +266,7 @@ def eventful() -> Scene:
     return fm.SceneBuilder("caught").add(*pendulum().bodies, *pendulum().hinges, *pendulum().markers, LATCH).scene()
 
 
-@pytest.mark.parametrize("name", ["pinocchio", "mujoco", "exudyn", "exudyn-beam", "drake"])
+@pytest.mark.parametrize("name", ["pinocchio", "mujoco", "exudyn", "exudyn-beam", "drake", "opensim"])
 def test_peers_refuse_scenes_with_events(name: str) -> None:
     support = CheckedEngine(engine(name)).supports(eventful())
     assert support.kind == "no" and "caught" in support.reason and "knows no events" in support.reason

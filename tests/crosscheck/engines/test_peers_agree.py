@@ -19,7 +19,7 @@ ENGINES = engines()
 ACCELERATION = 1e-10
 LOAD = 1e-9
 REDUNDANT = {"exudyn": 100.0}
-NO_ARMATURES = ("basilisk", "dart", "exudyn")
+NO_ARMATURES = ("basilisk", "dart", "exudyn", "opensim")
 
 
 def _snapshot(name: str, scene) -> Snapshot:

@@ -5,15 +5,17 @@ import pytest
 from msgspec.structs import replace
 
 from crosscheck.engines.contract import Effort, Engine, EngineMissing, Run
+from crosscheck.engines.opensim.engine import MASSLESS
 from crosscheck.engines.registry import engines
 from crosscheck.engines.trajectories import continuous
 from flexmb.scene.build import SceneBuilder
-from flexmb.scene.functions import Constant, Function, Pulse, SpinUp
+from flexmb.scene.functions import Constant, Function, Pulse, Sine, SpinUp
 from flexmb.scene.schema import BeamStation, Scene
 from tests.crosscheck.engines.random_scenes import random_scene
 
 RIGID = ("pinocchio", "mujoco")
-PEERS = (*RIGID, "drake", "dart")
+PEERS = (*RIGID, "drake", "dart", "opensim")
+OF_SCIPY = ("dart", "opensim")  # whose efforts are SciPy's tolerances, and whose prescribed motion is its function's
 KINDS = ("free", "revolute", "spherical", "prismatic", "universal")
 
 
@@ -49,7 +51,7 @@ def test_a_pulse_between_samples_costs_no_accuracy(name):
 
 COARSE = {
     "pinocchio": None, "mujoco": Effort("step", 1e-3, "RK4"), "drake": Effort("step", 1e-3, "runge_kutta5"),
-    "dart": Effort("tolerance", 1e-4, "DOP853"),
+    "dart": Effort("tolerance", 1e-4, "DOP853"), "opensim": Effort("tolerance", 1e-4, "DOP853"),
 }  # fmt: skip
 
 
@@ -121,14 +123,16 @@ def test_trajectories_agree_within_their_refinement(seed):
         assert np.abs(a - b).max() <= 1e-6 * max(1.0, np.abs(a).max())
 
 
-@pytest.mark.parametrize(("name", "seed"), [("drake", 0), ("drake", 1), ("dart", 0), ("dart", 1), ("dart", 2)])
+@pytest.mark.parametrize(("name", "seed"), [
+    ("drake", 0), ("drake", 1), ("dart", 0), ("dart", 1), ("dart", 2), ("opensim", 0), ("opensim", 1),
+])  # fmt: skip
 def test_runs_agree_with_pinocchios(name, seed):
     """Free and ball joints on turned frames of turning bodies, where DART's speeds have axes of their own."""
-    rng, apart = np.random.default_rng(300 + seed), {"drake": 1e-8, "dart": 1e-9}[name]
+    rng, apart = np.random.default_rng(300 + seed), {"drake": 1e-8, "dart": 1e-9, "opensim": 1e-9}[name]
     scene = random_scene(rng, ("free", "revolute", *KINDS), driven=True)
     run, engine, fine = Run(np.linspace(0.0, 1.0, 6)), peer(name), Effort("tolerance", 1e-12, "DOP853")
     theirs = peer("pinocchio").compile(scene).simulate(run, fine)
-    ours = engine.compile(scene).simulate(run, fine if name == "dart" else engine.efforts(scene)[-1])
+    ours = engine.compile(scene).simulate(run, fine if name in OF_SCIPY else engine.efforts(scene)[-1])
     assert ours.status == "finished", ours.message
     for marker, path in theirs.markers.items():
         assert ours.markers[marker].position == pytest.approx(path.position, abs=apart), marker
@@ -136,7 +140,7 @@ def test_runs_agree_with_pinocchios(name, seed):
     for mine, other in ((ours.loads, theirs.loads), (ours.drives, theirs.drives)):
         for joint, load in other.items():
             assert mine[joint] == pytest.approx(load, rel=100.0 * apart, abs=100.0 * apart), joint
-    if name == "dart":
+    if name in OF_SCIPY:
         assert ours.work == pytest.approx(theirs.work, rel=1e-8, abs=1e-8)
 
 
@@ -155,7 +159,7 @@ def test_prescribed_spin_up_is_followed_to_the_end(name):
     angle = 4.0 / 4.0 * (2.0**2 / 2 - 2 * (4.0 / (2 * np.pi)) ** 2), 4.0 * (5.0 - 2.0)
     exact = np.column_stack([np.cos(angle), np.sin(angle)])
     # RK4 at the finest step over 5 s: (h w)^4 is 1e-10 or less.
-    assert path.markers["tip"].position[1:, :2] == pytest.approx(exact, abs=1e-12 if name == "dart" else 1e-9)
+    assert path.markers["tip"].position[1:, :2] == pytest.approx(exact, abs=1e-12 if name in OF_SCIPY else 1e-9)
     assert path.drives["drive"] == pytest.approx(np.array([[0.0], [1.1 * 2.0], [0.0]]), abs=1e-8)
 
 
@@ -250,3 +254,57 @@ def test_what_dart_refuses_is_named() -> None:
     assert support.kind == "no" and 'closure "bolt": DART closes loops by impulses' in support.reason
     with pytest.raises(ValueError, match="by impulses"):
         peer("dart").compile(scene)
+
+
+@pytest.mark.parametrize("beside", [0.0, 1e-12, 1e-9, 1e-6, 1e-3])
+def test_opensims_angles_of_balls_and_free_flight_may_be_singular(beside: float) -> None:
+    """At a second angle of a quarter turn the others are ill-determined, but what they make together is not."""
+    half = (0.5 * np.pi - beside) / 2.0
+    first = np.array([np.cos(0.4), np.sin(0.4), 0.0, 0.0])
+    turn = np.array([np.cos(half), 0.0, np.sin(half), 0.0])
+    product = [first[0] * turn[0], first[1] * turn[0], first[0] * turn[2], first[1] * turn[2]]
+    turned = {"quaternion": product, "angular_velocity": (1.0, 2.0, 3.0)}
+    builder = SceneBuilder("turned", gravity=(0.3, -9.0, 2.0))
+    for name in ("free", "ball"):
+        builder.rigid_body(name, mass=2.0, com=(0.1, 0.2, -0.3), inertia=(0.1, 0.2, 0.25))
+        builder.marker(name, name, offset=(1.0, 1.0, 1.0))
+    scene = builder.free("free", "ground", "free", **turned).spherical("ball", "ground", "ball", **turned).scene()
+    ours, theirs = (peer(name).compile(scene).evaluate() for name in ("opensim", "pinocchio"))
+    for name, marker in theirs.markers.items():
+        assert ours.markers[name].position == pytest.approx(marker.position, abs=1e-14), name
+        assert ours.markers[name].acceleration == pytest.approx(marker.acceleration, abs=1e-12), name
+
+
+def test_what_acts_in_opensim_is_replaced_at_every_look() -> None:
+    model = peer("opensim").compile(pushed(Constant(value=6.0)))
+    assert [model.evaluate().markers["body"].acceleration[3] for _ in range(3)] == [3.0, 3.0, 3.0]
+
+
+def test_opensim_takes_no_inertia_without_mass() -> None:
+    """It would drop it in silence: a rotor without mass would cost its drive nothing."""
+
+    def with_rotor(mass: float) -> Scene:
+        other = SceneBuilder("rotor").rigid_body("hub", mass=1.0, inertia=(0.1, 0.1, 0.1)).free("free", "ground", "hub")
+        other.wheel("rotor", "hub", axis=(0, 0, 1), mass=mass, axial_inertia=0.02, transverse_inertia=0.01, speed=9.0)
+        return other.marker("hub", "hub").scene()
+
+    support = peer("opensim").supports(with_rotor(0.0))
+    assert support.kind == "no" and 'without mass ("rotor")' in support.reason
+    light = with_rotor(MASSLESS)
+    ours, theirs = (peer(name).compile(light).evaluate() for name in ("opensim", "pinocchio"))
+    assert ours.energy["kinetic"] == pytest.approx(theirs.energy["kinetic"], rel=1e-12) and ours.energy["kinetic"] > 0.8
+
+
+@pytest.mark.parametrize("mass", [0.0, 0.1])
+@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
+def test_opensim_drives_what_has_no_inertia(kind: str, mass: float) -> None:
+    """Simbody divides by the inertia that a coordinate moves; here that is none, or that of a point on its axis."""
+    builder = SceneBuilder("arm", gravity=(0.0, -9.81, 0.0))
+    builder.rigid_body("arm", mass=1.0, com=(0.5, 0.0, 0.0), inertia=(0.1, 0.1, 0.1)).revolute("pin", "ground", "arm")
+    builder.rigid_body("tool", mass=mass, inertia=(0.0, 0.0, 0.0)).marker("tool", "tool", offset=(0.0, 1.0, 0.0))
+    drive = {"axis": (1.0, 0.0, 0.0), "prescribed": Sine(amplitude=0.3, angular_frequency_rad_s=2.0)}
+    scene = getattr(builder, kind)("drive", "arm", "tool", parent_position=(1.0, 0.0, 0.0), **drive).scene()
+    ours, theirs = (peer(name).compile(scene).evaluate() for name in ("opensim", "pinocchio"))
+    assert ours.markers["tool"].acceleration == pytest.approx(theirs.markers["tool"].acceleration, abs=1e-13)
+    assert ours.drives["drive"] == pytest.approx(theirs.drives["drive"], abs=1e-14)
+    assert ours.loads["pin"] == pytest.approx(theirs.loads["pin"], abs=1e-13)
