@@ -18,7 +18,7 @@ from flexmb.integrate.watch import Watch
 from flexmb.jit.bundle import AnyBundle, bundle
 from flexmb.jit.direct import nothing_at, real_at, status_at
 from flexmb.jit.kernel import helper, kernel
-from flexmb.jit.lanes import LANES
+from flexmb.jit.lanes import LANES, some
 from flexmb.jit.pointer import REAL, STATUS, VECTOR, VOID, WHOLE, Pointer, pointer
 from flexmb.typing import Index, Real
 
@@ -40,7 +40,7 @@ class FastestStates:
 
     entry: Index
     weight: Real  # (G,m) of the entries in each sum
-    slow: Real  # (R,G) the sums of states that are not kept
+    slow: Real  # (R,G) the sums of states that are not kept: 1, or inf of what is not watched
     size: Real
     state: Real
     times: Real
@@ -236,6 +236,8 @@ def lane_project(s, r):
         total = 0.0
         for i in range(f.entry.shape[0]):
             total += f.weight[g, i] * abs(s.trial[f.entry[i]])
+        if not some(total > 1.0):
+            continue
         s.norm[2] = total  # nobody needs it beyond the first step
         for lane in range(LANES):
             if entries.chosen[0, lane] == 1.0:
