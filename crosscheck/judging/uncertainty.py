@@ -37,11 +37,12 @@ the size of the signal (Henrici 1962); systematic growth beyond that shows in th
 largest signal of the same family (all hinge torques, all positions): a backward-stable solve has errors relative to the
 norm of all unknowns. A short run has few evaluations, and then the rounding of the arithmetic that makes a channel of a
 state counts for more, which is the same at all efforts: on its way past n joints a number takes part in `ROUNDINGS` n
-operations. By the probabilistic bound of Higham and Mary (2019) their rounding errors add up to at most
+operations. Errors of rounding are spread over +- eps/2, and have at most the variance eps^2/12; their sum is nearly
+normal (Henrici 1962) and is bounded by
 
-    lambda sqrt(ROUNDINGS n) eps/2
+    LIKELY sqrt(ROUNDINGS n / 12) eps
 
-times the size, with a probability of 1 - 2 exp(-lambda^2/2) for each value: 1 - 3e-9 for lambda = `LIKELY`.
+times the size: few values in 1e9 are further than six standard deviations off.
 
 **Rest.** Efforts that made as many evaluations and gave the same result in every channel were ignored by the engine,
 and tell nothing. Derivatives of a state that rests are the exception: where nothing moves, every effort has that state.
@@ -75,7 +76,7 @@ EXCESS_GROWTH = 1.5  # ratio of the logarithm of that ratio to the one expected 
 ORDER_CREDIT = 4.0
 LARGEST_ORDER = 16.0
 ROUNDINGS = 17  # an entry of a joint's rotation 3, composed with the one before 5, an arm turned 5, added 1, a moment 3
-LIKELY = 6.4
+LIKELY = 6.0  # standard deviations
 LARGEST_RATIO = 1e6  # of two steps between which an order is estimated
 
 
@@ -163,7 +164,7 @@ def _enveloped(factor: float, gap: Real, floor: float, how: str, order: float | 
 
 def roundoff_floor(size: float, evaluations: int, joints: int = 0) -> float:
     """eps sqrt(N) times the size of the signals, and the rounding of arithmetic that passes so many joints."""
-    in_steps, in_channel = np.sqrt(float(min(evaluations, MOST_COUNTED))), 0.5 * LIKELY * np.sqrt(ROUNDINGS * joints)
+    in_steps, in_channel = np.sqrt(float(min(evaluations, MOST_COUNTED))), LIKELY * np.sqrt(ROUNDINGS * joints / 12.0)
     return float(np.finfo(np.float64).eps * (in_steps + in_channel) * size)
 
 
