@@ -101,7 +101,7 @@ class ClosedEquations(Equations):
     def loads(self, state: State, at: RestForces) -> Real:
         found, free = self._free.stiffness(state.t, pack(state)), self.free
         self._examine(state)
-        left = self._freedom(self._among_free(found.mass), found.J[:, free])
+        left = self._freedom(found.mass[self._among_free], found.J[:, free])
         return left.basis(at.chosen).T @ left.mass @ found.accelerations[free]
 
     def _independent(self, mass: Real, J: Real) -> tuple[Index, Real]:
