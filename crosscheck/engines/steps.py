@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from math import floor, log10
+from itertools import pairwise
+from math import ceil, floor, log2, log10
 from typing import TYPE_CHECKING
 
 from crosscheck.engines.contract import Effort
 
 if TYPE_CHECKING:  # it loads scipy, which a worker does without
     from crosscheck.engines.pace import Pace
+    from flexmb.typing import Real
 
 USUAL_S = 10.0
 """Assumed duration (s) where the run's is unknown."""
@@ -28,6 +30,18 @@ def ladder(method: str, pace: Pace, duration_s: float, rungs: int, usual: int = 
     finest = 2 ** (rungs - 1)
     coarsest = max(coarsest, duration_s * finest / MOST)
     return tuple(Effort("step", coarsest / 2**rung, method) for rung in range(rungs))
+
+
+def steps_between_samples(times: Real, step: float) -> int:
+    """Number of steps between two samples: the power of two that makes them at most `step`.
+
+    With powers of two the actual steps of two efforts have the ratio of their values. ValueError if the samples
+    are not uniform.
+    """
+    gaps = [later - earlier for earlier, later in pairwise(times)]
+    if max(gaps) - min(gaps) > 1e-9 * times[-1]:
+        raise ValueError("fixed steps need uniformly spaced output times")
+    return 2 ** max(0, ceil(log2(gaps[0] / step) - 1e-9))
 
 
 def _round(step: float) -> float:

@@ -13,6 +13,7 @@ from itertools import repeat
 
 import numpy as np
 
+from crosscheck.engines.beam_elements import between_stations, element_ends, shears
 from crosscheck.engines.conventions import rotation_matrix
 from crosscheck.engines.exudyn.carriers import Carrier, Workshop
 from crosscheck.engines.exudyn.motion import FrameMotion
@@ -20,7 +21,6 @@ from crosscheck.engines.exudyn.rotations import logarithm
 from flexmb.scene.rest_curve import rest_sections
 from flexmb.scene.schema import BeamBody
 from flexmb.scene.sections import inertia_on_axis, mass_centres, stiffness_on_axis
-from flexmb.scene.strains import polynomials
 from flexmb.scene.tree import nodes_along, rest_frames
 from flexmb.surrogate.lumping import Inertia, combine
 from flexmb.typing import Real
@@ -58,7 +58,7 @@ class SpatialBeam:
 
 def spatial_beam(shop: Workshop, body: BeamBody, motion: FrameMotion) -> SpatialBeam:
     """The beam at rest in its own frame, which moves by `motion` at t = 0."""
-    x = _stations(body)
+    x = element_ends(body)
     position, rotation = rest_sections(body, x)
     motions = [motion.offset(*each) for each in zip(position, rotation, strict=True)]
     carriers = [shop.rigid(*each) for each in zip(motions, repeat(np.eye(3)), _lumps(body, x))]
@@ -86,49 +86,20 @@ def _add(shop: Workshop, element: BeamElement) -> None:
     )
 
 
-def _stations(body: BeamBody) -> Real:
-    """Ends of the elements: nodes, stations and tip masses, and between them as many as make the scene's number."""
-    L = body.length_m
-    wanted = [0.0, L, *(each.x_m for each in (*body.nodes, *body.stations, *body.tip_masses))]
-    fixed = np.unique(np.round(np.array(wanted) / L, 12)) * L
-    parts = [
-        np.linspace(left, right, max(1, round(body.elements * (right - left) / L)), endpoint=False)
-        for left, right in zip(fixed, fixed[1:], strict=False)
-    ]
-    return np.concatenate([*parts, [L]])
-
-
-def _interpolated(body: BeamBody, matrices: list[Real], x: Real) -> Real:
-    """Matrices (n,6,6) at x (n,), linear between stations."""
-    at = [station.x_m for station in body.stations]
-    stacked = np.array(matrices)
-    interpolated = np.empty((len(x), 6, 6))
-    for i in range(6):
-        for j in range(6):
-            interpolated[:, i, j] = np.interp(x, at, stacked[:, i, j])
-    return interpolated
-
-
 def _stiffness(body: BeamBody, x: Real) -> Real:
     """Diagonals (n,6) of the stiffness. A beam without shear yields to shear as little as to stretch: stiffer springs
     would stop Newton's method at steps that follow the bending."""
-    diagonals = np.array([np.diag(each) for each in _interpolated(body, [*map(stiffness_on_axis, body.stations)], x)])
+    stiffness = between_stations(body, [*map(stiffness_on_axis, body.stations)], x)
+    diagonals = np.array([np.diag(each) for each in stiffness])
     if not shears(body):
         diagonals[:, 1:3] = diagonals[:, :1]
     return diagonals
 
 
-def shears(body: BeamBody) -> bool:
-    """Whether the scene's beam shears."""
-    if body.level == "exact":
-        return bool({"shear_y", "shear_z"} & set(polynomials(body)))
-    return body.theory == "timoshenko"
-
-
 def _lumps(body: BeamBody, x: Real) -> list[Inertia]:
     """The inertia of every section in its axes: half of each element beside it, and tip masses."""
     middles, lengths = (x[1:] + x[:-1]) / 2.0, np.diff(x)
-    per_length = _interpolated(body, [*map(inertia_on_axis, body.stations)], middles)
+    per_length = between_stations(body, [*map(inertia_on_axis, body.stations)], middles)
     mass, com, inertia = mass_centres(per_length)
     parts: list[list[Inertia]] = [[] for _ in x]
     for k, half in enumerate(lengths / 2.0):

@@ -13,6 +13,7 @@ from crosscheck.engines.exudyn.assembly import Assembly
 from crosscheck.engines.exudyn.beams import PlanarBeam
 from crosscheck.engines.exudyn.kkt import initial_state
 from crosscheck.engines.exudyn.state import States
+from crosscheck.engines.steps import steps_between_samples
 from flexmb.typing import Real
 
 IMPLICIT = ("TrapezoidalIndex2", "GeneralizedAlpha")
@@ -118,18 +119,6 @@ def _settings(assembly: Assembly | PlanarBeam):
     settings.timeIntegration.verboseMode = 0
     settings.timeIntegration.adaptiveStep = False
     return settings
-
-
-def steps_between_samples(times: Real, step: float) -> int:
-    """Number of steps between two samples: the power of two that makes them at most `step`.
-
-    With powers of two the actual steps of two efforts have the ratio of their values. ValueError if the samples
-    are not uniform.
-    """
-    gaps = np.diff(times)
-    if np.ptp(gaps) > 1e-9 * times[-1]:
-        raise ValueError("Exudyn's fixed-step solvers need uniformly spaced output times")
-    return 2 ** max(0, int(np.ceil(np.log2(gaps[0] / step) - 1e-9)))
 
 
 def _fixed(assembly: Assembly | PlanarBeam, times: Real, effort: Effort) -> tuple[States, int, float]:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import sqrt
 
 import numpy as np
 
+from crosscheck.engines.beam_elements import first_bending, shears
 from crosscheck.engines.exudyn.assembly import bends
-from crosscheck.engines.exudyn.sections import shears
 from crosscheck.engines.exudyn.support import refusals
 from flexmb.scene.schema import BeamBody, Scene
 from flexmb.scene.sections import inertia_on_axis, stiffness_on_axis
@@ -45,15 +44,7 @@ def reason(scene: Scene) -> str:
 def fastest_bending(scene: Scene) -> float:
     """Highest of the first frequencies (rad/s) of all beams, free and in their stiffer plane, by their first
     station."""
-    return max(22.37 / beam.length_m**2 * sqrt(_stiffer(beam) / _mass(beam)) for beam in bending(scene))
-
-
-def _stiffer(beam: BeamBody) -> float:
-    return float(np.diag(stiffness_on_axis(beam.stations[0]))[4:].max())
-
-
-def _mass(beam: BeamBody) -> float:
-    return float(inertia_on_axis(beam.stations[0])[0, 0])
+    return max(map(first_bending, bending(scene)))
 
 
 def _beam_refusals(beam: BeamBody) -> Iterator[str]:
