@@ -82,6 +82,17 @@ def breaks(function: Function) -> tuple[float, ...]:
             assert_never(function)
 
 
+def jumps(function: Function) -> tuple[float, ...]:
+    """Times (s) after t = 0 at which the value of the function jumps."""
+    match function:
+        case Pulse(start_s=start, duration_s=duration):
+            return tuple(t for t in (start, start + duration) if t > 0.0)
+        case Constant() | Ramp() | Sine() | SmoothStep() | SpinUp() | Table() | ControlSignal():
+            return ()
+        case _:
+            assert_never(function)
+
+
 def breaks_between(functions: list[Function], first: float, last: float) -> list[float]:
     """All break times strictly inside (first, last), sorted, each once."""
     return sorted({t for function in functions for t in breaks(function) if first < t < last})

@@ -33,6 +33,7 @@ BUILT_IN = {
     "dart": "crosscheck.engines.dart:DartEngine",
     "basilisk": "crosscheck.engines.basilisk:BasiliskEngine",
     "opensim": "crosscheck.engines.opensim:OpensimEngine",
+    "kratos": "crosscheck.engines.kratos:KratosEngine",
 }
 OWN_CODE = tuple(name for name, place in BUILT_IN.items() if place.startswith("crosscheck.engines.native:"))
 # For each engine the one whose library or compiled code it shares: both run in the same worker process.

@@ -44,6 +44,7 @@ SIGNS = {
     "rerun-sdk": "import rerun", "selenium": "importorskip(\"selenium", "sphinx": "\"-m\", \"sphinx\"",
     "furo": "html_theme = \"furo\"", "myst-parser": "\"myst_parser\"",
     "drake": "import pydrake", "bsk": "import Basilisk", "cmeel-eigen": "include/eigen3",
+    "KratosStructuralMechanicsApplication": "import KratosMultiphysics.StructuralMechanicsApplication",
 }  # fmt: skip
 EXTRAS = PYPROJECT["project"]["optional-dependencies"]
 

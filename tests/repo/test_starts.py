@@ -19,8 +19,10 @@ from flexmb.scene import schema
 from tests.repo.project import PYPROJECT
 
 DEPENDENCIES = {re.split(r"[^\w-]", each)[0].lower() for each in PYPROJECT["project"]["dependencies"]}
-PEERS = {"llvmlite", "pinocchio", "mujoco", "exudyn", "pydrake", "dartpy", "Basilisk", "opensim"}
-PEERS |= {"dask", "pandas", "pyarrow"}
+PEERS = {
+    "llvmlite", "pinocchio", "mujoco", "exudyn", "pydrake", "dartpy", "Basilisk", "opensim", "KratosMultiphysics",
+    "dask", "pandas", "pyarrow",
+}  # fmt: skip
 LIBRARIES = DEPENDENCIES | PEERS
 OF_WORDS = {"typer", "rich"}  # what reads a command line and prints help
 OF_CASES = OF_WORDS | {"numpy", "msgspec"}  # what the structs of scenes and cases are made of
