@@ -45,7 +45,8 @@ class KratosModel:
             states.append(steps.state())
             work.append(steps.work)
         wall = perf_counter() - begin
-        samples = [_snapshot(mesh.layout, state) for state in states]
+        # The load at the start depends on the mesh: it is that of the scene's own at every effort, as in `evaluate`.
+        samples = [self.evaluate(), *(_snapshot(mesh.layout, state) for state in states[1:])]
         return stack(
             run.times, samples, message=message, wall_s=wall, evaluations=steps.iterations, work=np.array(work)
         )
