@@ -73,7 +73,8 @@ def test_missing_library_names_what_pip_finds(monkeypatch, name, module, package
 
 def test_remedies_are_the_distributions_of_the_extras() -> None:
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
-    known = {re.split(r"[^\w-]", each)[0] for name in ("peers", "more-peers", "opensim", "kratos") for each in extras[name]}
+    ours = ("peers", "more-peers", "opensim", "kratos")
+    known = {re.split(r"[^\w-]", requirement)[0] for name in ours for requirement in extras[name]}
     assert {package for *_, package in LIBRARIES} == known - {"exudyn"}, "Exudyn's is tried beside its engines"
     foreign = set(registry.BUILT_IN) - set(registry.OWN_CODE)
     assert {name for name, *_ in LIBRARIES} == {name for name in foreign if not name.startswith("exudyn")}

@@ -132,8 +132,8 @@ def test_the_flexible_four_bar_with_a_tilted_pin_runs():
     assert largest_gap(system, run) < 1e-10
     assert np.max(np.abs(run.energy_drift)) < 1e-9 * run.energy_scale
     assert run.work[-1] > 0.5 * run.energy["strain"][-1] > 0.0
-    # Without the tilt the bars of a parallelogram turn together and stay straight, as far as the run knows its modes: its
-    # absolute tolerance. Rounding out of the plane depends on the machine, 3e-13 to 3e-12 m here.
+    # Without the tilt the bars of a parallelogram turn together and stay straight, as far as the run knows its modes:
+    # its absolute tolerance. Rounding out of the plane depends on the machine, 3e-13 to 3e-12 m here.
     straight = m.tilted_four_bar(flexible=True, drive=DRIVE, tilt=0.0)
     plane = flexmb.simulate(straight, 0.05, rtol=1e-7, atol=1e-9, samples=11)
     assert np.max(np.abs(plane.markers["pin"].position[:, 2])) < 1e-9
