@@ -50,8 +50,8 @@ def _let_go() -> None:
 
 def _others_import() -> bool:
     """Whether another thread is importing one of our modules, or one that flexmb imports when it is needed."""
-    found = [_importing[name]() for name in list(_importing) if name.partition(".")[0] in _OURS]
-    return any(getattr(lock, "owner", None) not in (None, get_ident()) for lock in found)
+    modules = [_importing[name]() for name in list(_importing) if name.partition(".")[0] in _OURS]
+    return any(getattr(lock, "owner", None) not in (None, get_ident()) for lock in modules)
 
 
 if hasattr(os, "register_at_fork"):

@@ -72,9 +72,7 @@ def user_law(outputs: Any) -> fm.Scene:
     made = fm.SceneBuilder("x").rigid_body("hub", mass=1.0, inertia=(0.1, 0.1, 0.1)).free("base", "ground", "hub")
     made.sense_time("t").user_law("law", "t", "flexmb.control.attitude:eigenaxis_slew", outputs=outputs)
     torque = fm.ControlSignal(source="law[0]", gain=-1.0)
-    made.wheel(
-        "w", "hub", axis=(0, 0, 1), mass=0.1, axial_inertia=1e-3, transverse_inertia=1e-3, torque=torque
-    )
+    made.wheel("w", "hub", axis=(0, 0, 1), mass=0.1, axial_inertia=1e-3, transverse_inertia=1e-3, torque=torque)
     return fm.compile(made.scene()).scene
 
 
@@ -176,11 +174,11 @@ def found_numbers() -> set[str]:
             members = {f"{name}.{each}": value for each, value in vars(item).items() if own and each[0] != "_"}
         for place, call in members.items():
             if inspect.isfunction(call) and not place.startswith(LAYERS):
-                for each in inspect.signature(call).parameters.values():
-                    plain = re.sub(r"(Mapping|tuple|Sequence|dict|list)\[.*\]", "", str(each.annotation))
-                    physics = place.startswith("SceneBuilder.") and "int" not in plain and each.name != "t_end"
-                    if NUMBER.search(plain) and not physics and each.name not in NO_SIZE.get(place, ()):
-                        found.add(f"{place}.{each.name}")
+                for parameter in inspect.signature(call).parameters.values():
+                    plain = re.sub(r"(Mapping|tuple|Sequence|dict|list)\[.*\]", "", str(parameter.annotation))
+                    physics = place.startswith("SceneBuilder.") and "int" not in plain and parameter.name != "t_end"
+                    if NUMBER.search(plain) and not physics and parameter.name not in NO_SIZE.get(place, ()):
+                        found.add(f"{place}.{parameter.name}")
     return found
 
 
@@ -189,9 +187,9 @@ def commands() -> dict[str, tuple[Any, str, str]]:
     found: dict[str, tuple[Any, str, str]] = {}
     for program in ("flexmb", "crosscheck"):
         app = import_module(f"{program}.cli").app
-        for each in app.registered_commands:
-            name = each.name or each.callback.__name__
-            for argument in inspect.signature(each.callback, eval_str=True).parameters.values():
+        for command in app.registered_commands:
+            name = command.name or command.callback.__name__
+            for argument in inspect.signature(command.callback, eval_str=True).parameters.values():
                 kind, *about = typing.get_args(argument.annotation) or (argument.annotation,)
                 if NUMBER.search(str(kind)):
                     words = [word for part in about for word in getattr(part, "param_decls", None) or ()]
@@ -256,7 +254,7 @@ def keys_of_files() -> dict[str, Key]:
     """By file and key, all whole numbers and times (s) of run files and sweeps, in the first file with its table."""
     found, tables = dict[str, Key](), set[type]()
     runs = ((RunFile, file, partial(_read_case, file.parent)) for file in sorted(CASES.glob("*/*/run.toml")))
-    sweeps = ((SweepFile, each, _read_sweep) for each in SWEEPS)
+    sweeps = ((SweepFile, sweep, _read_sweep) for sweep in SWEEPS)
     for root, given, read in (*runs, *sweeps):
         content = tomllib.loads(given if isinstance(given, str) else given.read_text(encoding="utf-8"))
         for kind, place, numbers in _tables(root, content, ()):
@@ -285,9 +283,9 @@ def _kinds(kind: Any) -> set[type]:
 def _sizes(kind: type) -> list[str]:
     hints = typing.get_type_hints(kind)
     return [
-        each.encode_name
-        for each in msgspec.structs.fields(kind)
-        if int in (hints[each.name], *typing.get_args(hints[each.name])) or each.name.endswith("_s")
+        field.encode_name
+        for field in msgspec.structs.fields(kind)
+        if int in (hints[field.name], *typing.get_args(hints[field.name])) or field.name.endswith("_s")
     ]
 
 
@@ -296,9 +294,9 @@ def _tables(kind: Any, content: Any, place: Steps) -> Iterator[tuple[type, Steps
     if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
         yield kind, place, _sizes(kind)
         hints = typing.get_type_hints(kind)
-        for each in msgspec.structs.fields(kind):
-            if each.encode_name in content:
-                yield from _tables(hints[each.name], content[each.encode_name], (*place, each.encode_name))
+        for field in msgspec.structs.fields(kind):
+            if field.encode_name in content:
+                yield from _tables(hints[field.name], content[field.encode_name], (*place, field.encode_name))
     elif isinstance(content, list):
         for i, each in enumerate(content):
             yield from _tables(typing.get_args(kind)[0], each, (*place, i))

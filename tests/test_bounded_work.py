@@ -122,10 +122,10 @@ def _takes_a_scene(item: Any) -> bool:
         arguments = inspect.signature(item).parameters.values()
     except ValueError:  # of compiled classes
         return False
-    return any(re.search(r"\bScene\b", str(each.annotation)) for each in arguments)
+    return any(re.search(r"\bScene\b", str(argument.annotation)) for argument in arguments)
 
 
-@pytest.mark.parametrize(("call", "remedy"), [each for calls in TOO_LARGE.values() for each in calls])
+@pytest.mark.parametrize(("call", "remedy"), [call for calls in TOO_LARGE.values() for call in calls])
 def test_a_scene_that_is_too_large_is_refused_before_it_is_built(call, remedy: str, monkeypatch) -> None:
     builder, names = fm.SceneBuilder("sixty"), ["a", *(f"body {i}" for i in range(2, 61))]
     for before, name in zip(("ground", *names), names, strict=False):

@@ -100,5 +100,7 @@ def _unfit(outcome: SessionOutcome) -> str:
         return f"{len(outcome.broken)} lines of its records are lost"
     if outcome.uncompared:
         return f"{', '.join(outcome.uncompared)} was compared in nothing"
-    missing = [each for each in outcome.absences if each.status == "did not run" and each.engine in outcome.asked]
+    missing = [
+        absence for absence in outcome.absences if absence.status == "did not run" and absence.engine in outcome.asked
+    ]
     return f"{missing[0].engine} did not run: {missing[0].reason}" if missing else ""

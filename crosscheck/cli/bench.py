@@ -77,7 +77,7 @@ def bench(
                 print_bench(common.console, done)
         if json_file is not None:
             _write(json_file, benchmark_document(benches))
-    empty = [each.case for each in benches if not any(contest.timed for contest in each.contests)]
+    empty = [bench.case for bench in benches if not any(contest.timed for contest in bench.contests)]
     last = f"nobody was timed on {', '.join(empty)}" if empty else f"{len(benches)} cases timed"
     where = "" if json_file is None else f"; {json_file}"
     common.console.print(words(last + where, "red" if empty else "green"))

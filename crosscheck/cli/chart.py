@@ -60,6 +60,6 @@ def chart(
             if not quiet:
                 common.console.print(marked("✓", "green", f"{charts.case}: {page}"), soft_wrap=True)
         index = write_index(done, out)
-    good = not any(each.problem for each in done)
+    good = not any(point.problem for point in done)
     common.console.print(words(f"Index: {index}", "green" if good else "red"), soft_wrap=True)
     raise typer.Exit(int(not good))

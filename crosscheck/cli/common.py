@@ -212,7 +212,7 @@ def require_variants(cases: tuple[Case, ...], names: Iterable[str]) -> None:
     known = [variant.name for case in cases for variant in case.run.variants]
     for name in names:
         if name not in known:
-            refuse(f'no variant "{name}" in {", ".join(each.name for each in cases[:3])}'
+            refuse(f'no variant "{name}" in {", ".join(case.name for case in cases[:3])}'
                    f'{" and others" if len(cases) > 3 else ""}: {closest(name, set(known))}')  # fmt: skip
 
 

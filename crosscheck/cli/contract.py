@@ -83,4 +83,4 @@ def _chosen(patterns: Sequence[str]) -> tuple[str, ...]:
     for pattern in patterns:
         if not any(fnmatchcase(name, pattern) for name in CLAUSES):
             common.refuse(f'no clause "{pattern}": {closest(pattern, CLAUSES)}')
-    return tuple(name for name in CLAUSES if not patterns or any(fnmatchcase(name, each) for each in patterns))
+    return tuple(name for name in CLAUSES if not patterns or any(fnmatchcase(name, pattern) for pattern in patterns))

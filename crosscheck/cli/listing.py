@@ -50,6 +50,6 @@ def _plain(case: Case) -> dict[str, Any]:
         "title": case.run.title,
         "tags": case.run.tags,
         "folder": str(case.folder),
-        "variants": {each.name: {"engines": each.engines, "also": each.also} for each in case.run.variants},
+        "variants": {variant.name: {"engines": variant.engines, "also": variant.also} for variant in case.run.variants},
         "accepted_figures": sum(len(table) for table in case.accepted.values()),
     }

@@ -51,8 +51,10 @@ def stability(
     common.check_limit(time_limit)
     known = maps_of(PROVIDER)
     if maps == ["list"] and as_json:
-        axes = {name: {"x": each.x.label, "y": each.y.label} for name, each in known.items()}
-        common.print_json({name: axes[name] | {"overlay": each.overlay.name} for name, each in known.items()})
+        axes = {name: {"x": stability_map.x.label, "y": stability_map.y.label} for name, stability_map in known.items()}
+        common.print_json(
+            {name: axes[name] | {"overlay": stability_map.overlay.name} for name, stability_map in known.items()}
+        )
         return
     if maps == ["list"]:
         common.console.print(maps_table(known.values()))

@@ -74,7 +74,7 @@ def verify(
         require_engines(() if engine is None else (engine,))
         cases = found((case,))
         if len(cases) > 1:
-            refuse(f'"{case}" is {len(cases)} cases: name one of {", ".join(each.name for each in cases)}')
+            refuse(f'"{case}" is {len(cases)} cases: name one of {", ".join(case.name for case in cases)}')
         (chosen,) = cases
         require_variants(cases, () if variant is None else (variant,))
         from crosscheck.verify.against_case import outcome_json, verify_csv

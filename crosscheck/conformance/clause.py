@@ -37,7 +37,7 @@ def told_apart(first: ArrayLike, second: ArrayLike, allowed: ArrayLike = 0.0) ->
 
 
 def _shown(values: np.ndarray, digits: int) -> str:
-    text = [f"{float(each):.{digits}g}" for each in values.flat]
+    text = [f"{float(number):.{digits}g}" for number in values.flat]
     return f"[{' '.join(text)}]" if values.ndim else text[0]
 
 
@@ -119,10 +119,10 @@ def require(condition: bool, message: str) -> None:
         raise ClauseBroken(message)
 
 
-def equal(what: str, found: Any, expected: Any, scale: float = 1.0) -> None:
+def equal(what: str, answer: Any, expected: Any, scale: float = 1.0) -> None:
     """Compare numbers, within POINTWISE (or its allowance) of each expected one, of `scale` (SI) for small ones."""
     right = np.asarray(expected, dtype=float)
-    value = np.asarray(found, dtype=float)
+    value = np.asarray(answer, dtype=float)
     allowed = allowance(POINTWISE) * np.maximum(np.abs(right), scale)
     good = value.shape == right.shape and bool(np.all(np.abs(value - right) <= allowed))  # False with any NaN
     expected_digits, found_digits = told_apart(right, value, allowed)
@@ -135,9 +135,9 @@ def within(what: str, error: float, bound: float) -> None:
     require(error <= bound, f"{what} is off by {off}, where {most} can be explained by the engine's efforts")
 
 
-def hold_at_samples(what: str, found: Iterable[Real], expected: Real, times: Real) -> None:
+def hold_at_samples(what: str, answer: Iterable[Real], expected: Real, times: Real) -> None:
     """Compare the last of two runs (T, k) with the expected values, within their distance from each other."""
-    rough, fine = found
+    rough, fine = answer
     size = float(np.abs(expected).max())
     refinement = float(np.abs(rough - fine).max())
     require(refinement <= CONVERGED * size, f"{what}: the last two efforts are {refinement:.3g} apart, of {size:.3g}")
@@ -189,13 +189,13 @@ def finest_two(engine: Engine, scene: Scene, times: Real) -> tuple[Trajectory, T
     return coarser, finest
 
 
-def acceleration(found: Snapshot, marker: str) -> Real:
+def acceleration(answer: Snapshot, marker: str) -> Real:
     """[angular; linear] of a marker, which an engine may leave out."""
-    return np.asarray(given("accelerations of markers in evaluate()", found.markers[marker].acceleration))
+    return np.asarray(given("accelerations of markers in evaluate()", answer.markers[marker].acceleration))
 
 
-def given(what: str, found: Any) -> Any:
+def given(what: str, answer: Any) -> Any:
     """An optional part of an answer; NotOffered if the engine left it out."""
-    if found is None:
+    if answer is None:
         raise NotOffered(f"it does not offer {what}", f"give {what}")
-    return found
+    return answer

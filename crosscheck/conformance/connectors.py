@@ -43,24 +43,24 @@ TURN, SHIFT, TWO = np.array([0.3, -0.5, 0.4]), np.array([0.02, -0.01, 0.03]), (0
 
 @CONNECTORS.clause("A line longer than its free length pulls B towards A; its energy is the integral of its law.")
 def a_stretched_line_pulls(engine: Engine) -> None:
-    found = snapshot(engine, _held(**LAW).scene())
-    load = given("loads of connectors", found.connectors.get("line"))
+    answer = snapshot(engine, _held(**LAW).scene())
+    load = given("loads of connectors", answer.connectors.get("line"))
     equal("the load of the line on B", load, [0, 0, 0, *(-TENSION * ALONG)])
-    equal("the acceleration of the body", acceleration(found, "com")[3:], -TENSION / MASS * ALONG)
-    equal("the spring energy", given("the spring energy", found.energy.get("spring")), STORED)
+    equal("the acceleration of the body", acceleration(answer, "com")[3:], -TENSION / MASS * ALONG)
+    equal("the spring energy", given("the spring energy", answer.energy.get("spring")), STORED)
 
 
 @CONNECTORS.clause("A line's damper pulls where the ends part, and stores nothing.")
 def a_damper_resists_the_rate_of_length(engine: Engine) -> None:
-    found = snapshot(engine, _held(free_length=FREE, damping=5.0).scene())
-    equal("the acceleration of the body", acceleration(found, "com")[3:], -5.0 * RATE / MASS * ALONG)
-    equal("the spring energy", given("the spring energy", found.energy.get("spring")), 0.0)
+    answer = snapshot(engine, _held(free_length=FREE, damping=5.0).scene())
+    equal("the acceleration of the body", acceleration(answer, "com")[3:], -5.0 * RATE / MASS * ALONG)
+    equal("the spring energy", given("the spring energy", answer.energy.get("spring")), 0.0)
 
 
 @CONNECTORS.clause("A line's actuator pushes its ends apart where its force is positive.")
 def an_actuator_pushes_its_ends_apart(engine: Engine) -> None:
-    found = snapshot(engine, _held(free_length=FREE, force=Constant(value=3.0)).scene())
-    equal("the acceleration of the body", acceleration(found, "com")[3:], 3.0 / MASS * ALONG)
+    answer = snapshot(engine, _held(free_length=FREE, force=Constant(value=3.0)).scene())
+    equal("the acceleration of the body", acceleration(answer, "com")[3:], 3.0 / MASS * ALONG)
 
 
 @CONNECTORS.clause("A cable neither pushes nor damps nor stores while it is slack; taut, it pulls as a spring does.")
@@ -89,8 +89,8 @@ def a_table_is_met_and_continued(engine: Engine) -> None:
     """Equal intervals of 0.2 with the secants 15 and 35: the end slope is (3 35 - 15)/2."""
     table: dict[str, Any] = {"table": (-0.1, 0.1, 0.3), "loads": (-1.0, 2.0, 9.0)}
     for free, tension in ((0.4, 2.0), (0.0, 9.0 + 45.0 * 0.2)):
-        found = snapshot(engine, _held(free_length=free, **table).scene())
-        equal("the acceleration of the body", acceleration(found, "com")[3:], -tension / MASS * ALONG)
+        answer = snapshot(engine, _held(free_length=free, **table).scene())
+        equal("the acceleration of the body", acceleration(answer, "com")[3:], -tension / MASS * ALONG)
 
 
 @CONNECTORS.clause("What acts on A is the opposite of what acts on B: a line between free bodies keeps both momenta.")
@@ -108,11 +108,11 @@ def a_bushing_is_in_axes_of_a(engine: Engine) -> None:
     B = (0.5**0.5 * (np.cos(turn / 2) - np.sin(turn / 2)), 0.0, 0.0, 0.5**0.5 * (np.cos(turn / 2) + np.sin(turn / 2)))
     body = arm(NONE, NONE).free("free", "ground", "arm", position=(0.0, shift, 0.0), quaternion=B)
     scene = body.bushing("mount", "ground", "arm", quaternion_a=QUARTER, stiffness=STIFF).scene()
-    found = snapshot(engine, scene)
-    load = given("loads of connectors", found.connectors.get("mount"))
+    answer = snapshot(engine, scene)
+    load = given("loads of connectors", answer.connectors.get("mount"))
     equal("the load of the bushing on B", load, [0, 0, -30.0 * turn, 0, -400.0 * shift, 0])
     stored = 15.0 * turn**2 + 200.0 * shift**2
-    equal("the spring energy", given("the spring energy", found.energy.get("spring")), stored)
+    equal("the spring energy", given("the spring energy", answer.energy.get("spring")), stored)
 
 
 @CONNECTORS.clause("A bushing's turn is the rotation vector, and its load the derivative of its energy, for any turn.")
@@ -142,22 +142,22 @@ def a_bushing_reacts_on_a(engine: Engine) -> None:
 def an_angular_spring_turns_back(engine: Engine) -> None:
     pivot = arm(NONE).revolute("pivot", "ground", "arm", angle=0.3, rate=0.7)
     coil: dict[str, Any] = {"rest": 0.1, "preload": 0.5, "stiffness": 4.0, "stiffening": (0.0, 30.0), "damping": 0.2}
-    found = snapshot(engine, pivot.angular_spring("coil", "pivot", **coil).scene())
+    answer = snapshot(engine, pivot.angular_spring("coil", "pivot", **coil).scene())
     torque = -(0.5 + 4.0 * 0.2 + 30.0 * 0.2**3 + 0.2 * 0.7)
-    equal("the load along the angle", given("hinge forces", found.hinge_forces.get("coil")), [torque])
-    equal("the angular acceleration", acceleration(found, "origin")[2], torque / THIRD)
-    equal("the torque across the pivot", given("the load", found.loads.get("pivot"))[2], torque)
+    equal("the load along the angle", given("hinge forces", answer.hinge_forces.get("coil")), [torque])
+    equal("the angular acceleration", acceleration(answer, "origin")[2], torque / THIRD)
+    equal("the torque across the pivot", given("the load", answer.loads.get("pivot"))[2], torque)
     stored = 0.5 * 0.2 + 2.0 * 0.2**2 + 7.5 * 0.2**4
-    equal("the spring energy", given("the spring energy", found.energy.get("spring")), stored)
+    equal("the spring energy", given("the spring energy", answer.energy.get("spring")), stored)
 
 
 @CONNECTORS.clause("A linear spring pulls back along its hinge, by its law of the displacement beyond rest.")
 def a_linear_spring_pulls_back(engine: Engine) -> None:
     slide = arm(NONE, NONE).prismatic("slide", "ground", "arm", axis=(0.0, 1.0, 0.0), position=0.3, rate=-0.5)
-    found = snapshot(engine, slide.linear_spring("coil", "slide", rest=0.1, stiffness=40.0, damping=2.0).scene())
+    answer = snapshot(engine, slide.linear_spring("coil", "slide", rest=0.1, stiffness=40.0, damping=2.0).scene())
     force = -(40.0 * 0.2 - 2.0 * 0.5)
-    equal("the load along the slide", given("hinge forces", found.hinge_forces.get("coil")), [force])
-    equal("the acceleration of the body", acceleration(found, "com")[3:], [0, force / MASS, 0])
+    equal("the load along the slide", given("hinge forces", answer.hinge_forces.get("coil")), [force])
+    equal("the acceleration of the body", acceleration(answer, "com")[3:], [0, force / MASS, 0])
 
 
 @CONNECTORS.clause("A stop pushes back by k d (1 + e d') beyond its angle, on either side, and never pulls.")
@@ -167,9 +167,9 @@ def a_stop_pushes_back(engine: Engine) -> None:
         (0.3, 0.7, 0.0), (0.6, 0.8, -5.0 * 1.4), (-0.3, -0.8, 5.0 * 1.4), (0.6, -0.8, -5.0 * 0.6), (0.6, -4.0, 0.0),
     ):  # fmt: skip
         pivot = arm(NONE).revolute("pivot", "ground", "arm", angle=angle, rate=rate)
-        found = snapshot(engine, pivot.angular_spring("stops", "pivot", **stops).scene())
-        equal(f"the load of stops at {angle} rad", given("hinge forces", found.hinge_forces.get("stops")), [torque])
-        equal("the angular acceleration", acceleration(found, "origin")[2], torque / THIRD)
+        answer = snapshot(engine, pivot.angular_spring("stops", "pivot", **stops).scene())
+        equal(f"the load of stops at {angle} rad", given("hinge forces", answer.hinge_forces.get("stops")), [torque])
+        equal("the angular acceleration", acceleration(answer, "origin")[2], torque / THIRD)
 
 
 @CONNECTORS.clause("Friction acts against the rate, and is greatest near rest where a static level is given.")
@@ -177,10 +177,10 @@ def friction_acts_against_the_rate(engine: Engine) -> None:
     levels: dict[str, Any] = {"sliding": 0.4, "static": 0.6, "stribeck": 0.3, "smoothing": 0.05}
     for rate in (0.2, -2.0):
         pivot = arm(NONE).revolute("pivot", "ground", "arm", rate=rate)
-        found = snapshot(engine, pivot.angular_friction("bearing", "pivot", **levels).scene())
+        answer = snapshot(engine, pivot.angular_friction("bearing", "pivot", **levels).scene())
         torque = -(0.4 + 0.2 / (1.0 + (rate / 0.3) ** 2)) * rate / np.hypot(rate, 0.05)
-        equal("the load along the angle", given("hinge forces", found.hinge_forces.get("bearing")), [torque])
-        equal("the angular acceleration", acceleration(found, "origin")[2], torque / THIRD)
+        equal("the load along the angle", given("hinge forces", answer.hinge_forces.get("bearing")), [torque])
+        equal("the angular acceleration", acceleration(answer, "origin")[2], torque / THIRD)
 
 
 @CONNECTORS.clause("Friction in a wheel's bearing brakes the wheel and turns its body along.")
@@ -190,10 +190,10 @@ def friction_of_a_wheel_reacts_on_its_body(engine: Engine) -> None:
         .free("free", "ground", "hub")
         .wheel("wheel", "hub", axis=(0.0, 0.0, 1.0), mass=0.5, axial_inertia=0.04, transverse_inertia=0.025, speed=10.0)
     )
-    found = snapshot(engine, spun.angular_friction("bearing", "wheel", sliding=0.3, smoothing=0.01).scene())
+    answer = snapshot(engine, spun.angular_friction("bearing", "wheel", sliding=0.3, smoothing=0.01).scene())
     torque = 0.3 * 10.0 / np.hypot(10.0, 0.01)
-    equal("the load along the angle", given("hinge forces", found.hinge_forces.get("bearing")), [-torque])
-    equal("the acceleration of the hub", acceleration(found, "hub"), [0, 0, torque / 1.5, 0, 0, 0])
+    equal("the load along the angle", given("hinge forces", answer.hinge_forces.get("bearing")), [-torque])
+    equal("the acceleration of the hub", acceleration(answer, "hub"), [0, 0, torque / 1.5, 0, 0, 0])
 
 
 @CONNECTORS.clause("Springs keep the energy; `work` has what dampers and friction lose and what actuators do.")
@@ -232,11 +232,11 @@ def _pair() -> SceneBuilder:
 
 
 def _keeps_momenta(engine: Engine, pair: SceneBuilder) -> None:
-    found = snapshot(engine, pair.scene())
+    answer = snapshot(engine, pair.scene())
     linear, angular = np.zeros(3), np.zeros(3)
     for marker, mass, inertia in (("com", MASS, INERTIA), ("other", 0.7, (0.05, 0.06, 0.07))):
-        at = found.markers[marker]
-        turned, pulled = rotation_matrix(at.quaternion), acceleration(found, marker)
+        at = answer.markers[marker]
+        turned, pulled = rotation_matrix(at.quaternion), acceleration(answer, marker)
         force = mass * pulled[3:]
         linear += force
         angular += turned @ (inertia * (turned.T @ pulled[:3])) + np.cross(at.position, force)

@@ -42,9 +42,9 @@ def _parts(scene: Scene) -> Iterator[str]:
 
 def _coordinates(hinge: object) -> Iterator[AngularCoordinate | LinearCoordinate]:
     for name in getattr(hinge, "__struct_fields__", ()):
-        found = getattr(hinge, name)
-        if isinstance(found, AngularCoordinate | LinearCoordinate):
-            yield found
+        coordinates = getattr(hinge, name)
+        if isinstance(coordinates, AngularCoordinate | LinearCoordinate):
+            yield coordinates
 
 
 def _abilities(part: object) -> Iterator[str]:

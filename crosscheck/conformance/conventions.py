@@ -63,20 +63,20 @@ def momentum_is_about_the_world_origin(engine: Engine) -> None:
     com = np.array([0.2, -0.1, 0.3])
     motion: dict[str, Any] = {"position": tuple(place), "angular_velocity": tuple(w), "velocity": tuple(v)}
     scene = arm(NONE, tuple(com)).free("free", "ground", "arm", **motion).scene()
-    found = given("the momentum", snapshot(engine, scene).momentum)
+    momentum = given("the momentum", snapshot(engine, scene).momentum)
     p = MASS * (v + np.cross(w, com))
-    equal("the momentum", found, [*(np.array(INERTIA) * w + np.cross(place + com, p)), *p])
+    equal("the momentum", momentum, [*(np.array(INERTIA) * w + np.cross(place + com, p)), *p])
 
 
 @CONVENTIONS.clause("Accelerations are [angular; classical acceleration of the marker's point], in World axes.")
 def accelerations_are_those_of_the_point(engine: Engine) -> None:
     w, v, com = np.array([0.4, -0.7, 1.1]), np.array([0.3, 0.2, -0.5]), np.array([0.2, -0.1, 0.3])
     free = arm(NONE, tuple(com)).free("free", "ground", "arm", angular_velocity=tuple(w), velocity=tuple(v))
-    found = snapshot(engine, free.scene())
+    answer = snapshot(engine, free.scene())
     J = np.diag(INERTIA)
     alpha = -np.linalg.solve(J, np.cross(w, J @ w))
     origin = -np.cross(alpha, com) - np.cross(w, np.cross(w, com))
     p = MASS * (v + np.cross(w, com))
-    if "kinetic" in found.energy:
-        equal("the kinetic energy", found.energy["kinetic"], 0.5 * (w @ J @ w + p @ p / MASS))
-    equal("the acceleration of the origin", acceleration(found, "origin"), [*alpha, *origin])
+    if "kinetic" in answer.energy:
+        equal("the kinetic energy", answer.energy["kinetic"], 0.5 * (w @ J @ w + p @ p / MASS))
+    equal("the acceleration of the origin", acceleration(answer, "origin"), [*alpha, *origin])

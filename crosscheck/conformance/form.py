@@ -71,10 +71,12 @@ def a_solve_takes_time(engine: Engine) -> None:
         before = perf_counter()
         told.append(simulated(model, TIMES, finest).wall_s)
         taken.append(perf_counter() - before)
-    for each, call_s in zip(told, taken, strict=True):
-        clocks = f"wall_s is {each:.3g} s of a call that takes {call_s:.3g} s"
-        require(each > LEAST_SHARE * min(taken), f"{clocks}: time the solve by a clock, such as time.perf_counter()")
-        require(each <= 1.01 * call_s + 1e-3, f"{clocks}: compiling and warming up are no part of it")
+    for claimed_s, call_s in zip(told, taken, strict=True):
+        clocks = f"wall_s is {claimed_s:.3g} s of a call that takes {call_s:.3g} s"
+        require(
+            claimed_s > LEAST_SHARE * min(taken), f"{clocks}: time the solve by a clock, such as time.perf_counter()"
+        )
+        require(claimed_s <= 1.01 * call_s + 1e-3, f"{clocks}: compiling and warming up are no part of it")
 
 
 @FORM.clause("A run leaves nothing behind: no thread of Python, and neither threads, processes nor files that add up.")
@@ -156,12 +158,12 @@ def a_run_begins_at_the_initial_state(engine: Engine) -> None:
 
 @FORM.clause("Kinds of energy are kinetic, strain, spring and gravity; names of loads are those of the scene.")
 def a_snapshot_names_what_the_scene_has(engine: Engine) -> None:
-    found, scene = _start(engine), simplest(engine)
-    require(set(found.markers) == {"tip"}, f"it gives markers {sorted(found.markers)}: the scene has tip")
+    answer, scene = _start(engine), simplest(engine)
+    require(set(answer.markers) == {"tip"}, f"it gives markers {sorted(answer.markers)}: the scene has tip")
     hinge = scene.hinges[0].name
-    require(set(found.loads) <= {hinge}, f"it gives loads of {sorted(found.loads)}: the scene has {hinge}")
-    require(set(found.energy) <= set(ENERGIES), f"it gives energies {sorted(found.energy)}")
-    require(not found.wheel_loads and not found.drives, "it gives wheels or drives, of which the scene has none")
+    require(set(answer.loads) <= {hinge}, f"it gives loads of {sorted(answer.loads)}: the scene has {hinge}")
+    require(set(answer.energy) <= set(ENERGIES), f"it gives energies {sorted(answer.energy)}")
+    require(not answer.wheel_loads and not answer.drives, "it gives wheels or drives, of which the scene has none")
 
 
 @FORM.clause("A run that diverges is a status with its reason and the good samples, never an exception.")
@@ -222,12 +224,12 @@ def _holdings() -> dict[str, int]:
 
 def _left(known: set[threading.Thread], before: dict[str, int]) -> str:
     """What exists in addition to what was known before, in words."""
-    threads = [each.name for each in threading.enumerate() if each not in known]
+    threads = [thread.name for thread in threading.enumerate() if thread not in known]
     more = {what: number - before[what] for what, number in _holdings().items() if number > before[what]}
     told = [f"threads of Python ({', '.join(threads)})"] if threads else []
     return " and ".join(told + [f"{number} {what} more" for what, number in more.items()])
 
 
-def _same_side(found: Real, like: Real) -> Real:
+def _same_side(answer: Real, like: Real) -> Real:
     """The quaternion or its negative, whichever is nearer to the other."""
-    return found if float(np.dot(found, like)) >= 0.0 else -found
+    return answer if float(np.dot(answer, like)) >= 0.0 else -answer

@@ -142,10 +142,10 @@ def _matrix(engine: Engine, scene: Scene, name: str, right: KnownDerivatives) ->
 def _compare(run: Trajectory, scene: Scene, name: str, right: Real) -> None:
     """The derivative of the initial state with the right one (n,n), entry by entry."""
     names = coordinate_names(scene)
-    found, known = run.derivatives[name][0].reshape(right.shape), float(run.known_to[name][0])
-    apart = np.abs(found - right)
+    answer, known = run.derivatives[name][0].reshape(right.shape), float(run.known_to[name][0])
+    apart = np.abs(answer - right)
     row, column = np.unravel_index(int(np.argmax(apart)), apart.shape)
-    what = f"the derivative {name} of the acceleration of {names[row]}, by {names[column]}, {found[row, column]:.6g}"
+    what = f"the derivative {name} of the acceleration of {names[row]}, by {names[column]}, {answer[row, column]:.6g}"
     size = float(np.linalg.norm(right))
     require(known <= 1e-2 * size, f"derivatives {name} are known to {known:.2g} by the engine, of {size:.3g}")
     within(what, float(apart[row, column]), known + allowance(SHARE) * size)
@@ -156,12 +156,12 @@ def _frequencies(engine: Engine, scene: Scene, right: Real) -> None:
     run = _asked(engine, scene, "frequencies")
     if run.frequencies is None:
         raise _lacking("frequencies")
-    found, known, size = run.frequencies[0], float(run.known_to["frequencies"][0]), float(right[-1])
-    require(found.shape == right.shape, f"there are {len(found)} frequencies, and {len(right)} coordinates")
+    answer, known, size = run.frequencies[0], float(run.known_to["frequencies"][0]), float(right[-1])
+    require(answer.shape == right.shape, f"there are {len(answer)} frequencies, and {len(right)} coordinates")
     require(known <= 1e-2 * size, f"frequencies are known to {known:.2g} rad/s by the engine, of {size:.3g}")
-    worst = int(np.argmax(np.abs(found - right)))
-    what = f"frequency {worst + 1} of {len(right)}, {found[worst]:.6g} rad/s,"
-    within(what, float(np.abs(found - right)[worst]), known + allowance(SHARE) * size)
+    worst = int(np.argmax(np.abs(answer - right)))
+    what = f"frequency {worst + 1} of {len(right)}, {answer[worst]:.6g} rad/s,"
+    within(what, float(np.abs(answer - right)[worst]), known + allowance(SHARE) * size)
 
 
 def _lacking(what: str) -> NotOffered:

@@ -37,36 +37,36 @@ FEW = 16
 
 @MOTION.clause("Gravity accelerates along its vector, and loads nothing that falls freely.")
 def gravity_accelerates_along_its_vector(engine: Engine) -> None:
-    found = snapshot(engine, arm(DOWN).free("free", "ground", "arm").scene())
-    equal("the acceleration of the origin", acceleration(found, "origin"), [0, 0, 0, 0, 0, -G])
-    equal("the load across the free hinge", found.loads.get("free", np.zeros(6)), np.zeros(6))
-    equal("the gravity energy at the origin", found.energy.get("gravity", 0.0), 0.0)
+    answer = snapshot(engine, arm(DOWN).free("free", "ground", "arm").scene())
+    equal("the acceleration of the origin", acceleration(answer, "origin"), [0, 0, 0, 0, 0, -G])
+    equal("the load across the free hinge", answer.loads.get("free", np.zeros(6)), np.zeros(6))
+    equal("the gravity energy at the origin", answer.energy.get("gravity", 0.0), 0.0)
 
 
 @MOTION.clause("A positive angle turns by the right-hand rule about the hinge's axis.")
 def gravity_turns_a_level_arm_down(engine: Engine) -> None:
-    found = snapshot(engine, arm().revolute("pivot", "ground", "arm", axis=(0.0, 1.0, 0.0)).scene())
+    answer = snapshot(engine, arm().revolute("pivot", "ground", "arm", axis=(0.0, 1.0, 0.0)).scene())
     alpha = MASS * G * ARM / SECOND  # about +y: +x turns towards -z
-    equal("the acceleration of the origin", acceleration(found, "origin"), [0, alpha, 0, 0, 0, 0])
-    equal("the acceleration of the mass centre", acceleration(found, "com")[3:], [0, 0, -ARM * alpha])
+    equal("the acceleration of the origin", acceleration(answer, "origin"), [0, alpha, 0, 0, 0, 0])
+    equal("the acceleration of the mass centre", acceleration(answer, "com")[3:], [0, 0, -ARM * alpha])
 
 
 @MOTION.clause("The torque of a hinge's motor is on the outboard body, and part of the hinge's load.")
 def motor_torque_is_on_the_outboard_body(engine: Engine) -> None:
     scene = arm(NONE).revolute("pivot", "ground", "arm", torque=Constant(value=1.5)).scene()
-    found = snapshot(engine, scene)
+    answer = snapshot(engine, scene)
     expected = [0, 0, 1.5 / THIRD, 0, ARM * 1.5 / THIRD, 0]
-    equal("the acceleration of the mass centre", acceleration(found, "com"), expected)
-    load = given("the load of a revolute hinge", found.loads.get("pivot"))
+    equal("the acceleration of the mass centre", acceleration(answer, "com"), expected)
+    load = given("the load of a revolute hinge", answer.loads.get("pivot"))
     equal("the torque across the pivot", load[:3], [0, 0, 1.5])
 
 
 @MOTION.clause("The force of a hinge's motor is on the outboard body, and part of the hinge's load.")
 def motor_force_is_on_the_outboard_body(engine: Engine) -> None:
     slide = arm(NONE).prismatic("slide", "ground", "arm", axis=(0.0, 1.0, 0.0), force=Constant(value=3.0))
-    found = snapshot(engine, slide.scene())
-    equal("the acceleration of the mass centre", acceleration(found, "com"), [0, 0, 0, 0, 3.0 / MASS, 0])
-    load = given("the load of a prismatic hinge", found.loads.get("slide"))
+    answer = snapshot(engine, slide.scene())
+    equal("the acceleration of the mass centre", acceleration(answer, "com"), [0, 0, 0, 0, 3.0 / MASS, 0])
+    load = given("the load of a prismatic hinge", answer.loads.get("slide"))
     equal("the load across the slide", load, [0, 0, ARM * 3.0, 0, 3.0, 0])
 
 
@@ -75,26 +75,26 @@ def prescribed_hinge_reports_its_drive_load(engine: Engine) -> None:
     A, w, phase = 0.4, 2.0, 0.7
     wave = Sine(amplitude=A, angular_frequency_rad_s=w, phase_rad=phase)
     scene = arm().revolute("drive", "ground", "arm", axis=(0.0, 1.0, 0.0), prescribed=wave, stiffness=3.0).scene()
-    found = snapshot(engine, scene)
+    answer = snapshot(engine, scene)
     theta, rate, alpha = A * np.sin(phase), A * w * np.cos(phase), -A * w * w * np.sin(phase)
-    equal("the angular velocity", found.markers["origin"].velocity[:3], [0, rate, 0])
-    equal("the angular acceleration", acceleration(found, "origin")[:3], [0, alpha, 0])
+    equal("the angular velocity", answer.markers["origin"].velocity[:3], [0, rate, 0])
+    equal("the angular acceleration", acceleration(answer, "origin")[:3], [0, alpha, 0])
     total = SECOND * alpha - MASS * G * ARM * np.cos(theta)
-    equal("the torque across the hinge", given("the load", found.loads.get("drive"))[1], total)
-    equal("the drive load", given("drive loads", found.drives.get("drive")), [total + 3.0 * theta])
+    equal("the torque across the hinge", given("the load", answer.loads.get("drive"))[1], total)
+    equal("the drive load", given("drive loads", answer.drives.get("drive")), [total + 3.0 * theta])
 
 
 @MOTION.clause("A force in World axes at a node acts in World axes on the body, at the node.")
 def force_in_world_axes(engine: Engine) -> None:
-    found = acceleration(snapshot(engine, _pushed("world")), "body")
-    equal("the acceleration of the body", found, [0, 0, 0, 4.0 / MASS, 0, 0])
+    answer = acceleration(snapshot(engine, _pushed("world")), "body")
+    equal("the acceleration of the body", answer, [0, 0, 0, 4.0 / MASS, 0, 0])
 
 
 @MOTION.clause("A force in node axes turns with the body.")
 def force_in_node_axes(engine: Engine) -> None:
-    found = acceleration(snapshot(engine, _pushed("node")), "body")
+    answer = acceleration(snapshot(engine, _pushed("node")), "body")
     # The force is along the turned body's x, which is World y, at World (-0.5, 0, 0).
-    equal("the acceleration of the body", found, [0, 0, -2.0 / INERTIA[2], 0, 4.0 / MASS, 0])
+    equal("the acceleration of the body", answer, [0, 0, -2.0 / INERTIA[2], 0, 4.0 / MASS, 0])
 
 
 @MOTION.clause("A torque at a node turns the body.")
@@ -107,8 +107,8 @@ def torque_at_a_node(engine: Engine) -> None:
         .marker("body", "body")
         .scene()
     )
-    found = acceleration(snapshot(engine, scene), "body")
-    equal("the acceleration of the body", found, [0, 0.9 / INERTIA[1], 0, 0, 0, 0])
+    answer = acceleration(snapshot(engine, scene), "body")
+    equal("the acceleration of the body", answer, [0, 0.9 / INERTIA[1], 0, 0, 0, 0])
 
 
 @MOTION.clause("A moving point mass pulls on its carrier through its spring, whose energy counts as spring energy.")
@@ -124,9 +124,9 @@ def moving_point_mass_pulls_on_its_carrier(engine: Engine) -> None:
         .marker("tank", "tank")
         .scene()
     )
-    found = snapshot(engine, scene)
-    equal("the acceleration of the carrier", acceleration(found, "tank")[3:], [20.0 * 0.1 / MASS, 0, 0])
-    equal("the spring energy", given("the spring energy", found.energy.get("spring")), 0.5 * 20.0 * 0.1**2)
+    answer = snapshot(engine, scene)
+    equal("the acceleration of the carrier", acceleration(answer, "tank")[3:], [20.0 * 0.1 / MASS, 0, 0])
+    equal("the spring energy", given("the spring energy", answer.energy.get("spring")), 0.5 * 20.0 * 0.1**2)
 
 
 @MOTION.clause("A pendulum swings as the elliptic functions say, ever closer with finer efforts.")

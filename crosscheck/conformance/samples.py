@@ -74,12 +74,12 @@ def momentum_and_energy_of_a_run_hold_at_every_sample(engine: Engine) -> None:
     if not offered:
         given("the momentum, or kinetic and gravity energy", fine.momentum)
     for kind in offered:
-        found = [run.energy[kind][:, None] for run in (rough, fine)]
-        hold_at_samples(f"the {kind} energy (J)", found, expected[kind][:, None], TIMES)
+        energies = [run.energy[kind][:, None] for run in (rough, fine)]
+        hold_at_samples(f"the {kind} energy (J)", energies, expected[kind][:, None], TIMES)
     if fine.momentum is not None and rough.momentum is not None:
         momenta = rough.momentum, fine.momentum
-        hold_at_samples("the angular momentum (Nms)", (each[:, :3] for each in momenta), about_origin, TIMES)
-        hold_at_samples("the linear momentum (Ns)", (each[:, 3:] for each in momenta), linear, TIMES)
+        hold_at_samples("the angular momentum (Nms)", (momentum[:, :3] for momentum in momenta), about_origin, TIMES)
+        hold_at_samples("the linear momentum (Ns)", (momentum[:, 3:] for momentum in momenta), linear, TIMES)
 
 
 @SAMPLES.clause("The load of a line is along it, by its law of the length, at every sample of a run.")

@@ -68,7 +68,7 @@ def derivatives(scene: Scene) -> KnownDerivatives:
 
     def slopes(along: Callable[[int], Real]) -> Real:
         directions = [along(n) for n in coordinates]
-        return np.array([_slope(case, start, each)[coordinates] for each in directions]).T
+        return np.array([_slope(case, start, direction)[coordinates] for direction in directions]).T
 
     def displaced(n: int) -> Real:
         """The rates of all coordinates if this speed alone is 1; quaternions become longer, which does not matter."""
@@ -99,8 +99,8 @@ def _modal(body: ModalBody) -> dict[str, Any]:
     at_points = [_shapes(point, count) for point in body.points]
     return {
         "modes": count, "stiffness": body.stiffness, "damping": body.damping or np.zeros((count, count)),
-        "nodes": {each.name: _shapes(each, count) | {"rotation": rotation_matrix(each.quaternion)} for each in nodes},
-        "points": {key: [each[key] for each in at_points] for key in at_points[0]} | {
+        "nodes": {node.name: _shapes(node, count) | {"rotation": rotation_matrix(node.quaternion)} for node in nodes},
+        "points": {key: [point[key] for point in at_points] for key in at_points[0]} | {
             "mass_kg": [point.mass_kg for point in body.points],
             "mass_centre_offset_m": [point.com_offset_m for point in body.points],
             "inertia_kg_m2": [point.inertia_kg_m2 for point in body.points],
@@ -111,6 +111,7 @@ def _modal(body: ModalBody) -> dict[str, Any]:
 
 def _shapes(point: InertiaPoint | ModalNode, count: int) -> dict[str, Real]:
     """Position and modes (3,m) of a point; modes that are left out are zero."""
+
     def modes(shapes: Sequence[Sequence[float]]) -> Real:
         return np.array(shapes).T if shapes else np.zeros((3, count))
 
@@ -122,25 +123,23 @@ def _shapes(point: InertiaPoint | ModalNode, count: int) -> dict[str, Real]:
 
 def _answer(case: Any, t: float, y: Real) -> Answer:
     y, udot, drive = case.solved(t, y)
-    found, frames = case.observed(t, y), case.frames(y)
+    answer, frames = case.observed(t, y), case.frames(y)
     markers = {}
     for marker in case.data["markers"]:
         name, there = f"marker:{marker['name']}", case.node(frames, marker["body"], marker["node"], y)
         there = there.at(np.array(marker["offset_m"]), np.eye(3))
         acceleration = np.concatenate([there.alpha + there.W @ udot, there.a + there.V @ udot])
-        velocity = np.concatenate([found[f"{name}.angular_velocity"], found[f"{name}.velocity"]])
+        velocity = np.concatenate([answer[f"{name}.angular_velocity"], answer[f"{name}.velocity"]])
         markers[marker["name"]] = Motion(
-            found[f"{name}.position"], found[f"{name}.orientation"], velocity, acceleration
+            answer[f"{name}.position"], answer[f"{name}.orientation"], velocity, acceleration
         )
-    driven = {
-        joint["name"]: drive[[j for j in _speeds(case, joint) if j in case.prescribed]] for joint in case.joints
-    }
+    driven = {joint["name"]: drive[[j for j in _speeds(case, joint) if j in case.prescribed]] for joint in case.joints}
     return Answer(
         markers,
         {joint["name"]: _load(case, t, y, udot, frames, joint) for joint in case.joints},
         {name: load for name, load in driven.items() if load.size},
-        {kind: float(found[f"energy.{kind}"]) for kind in ("kinetic", "gravity", "spring", "strain")},
-        np.concatenate([found["momentum.angular"], found["momentum.linear"]]),
+        {kind: float(answer[f"energy.{kind}"]) for kind in ("kinetic", "gravity", "spring", "strain")},
+        np.concatenate([answer["momentum.angular"], answer["momentum.linear"]]),
     )
 
 

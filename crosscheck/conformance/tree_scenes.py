@@ -43,11 +43,11 @@ def body(tree: SceneBuilder, name: str) -> SceneBuilder:
 def placed(name: str, parent: str) -> dict[str, Any]:
     """The frames of a hinge: offset and turned on both sides, on the parent's port unless it is the ground."""
     n = PARTS.index(name)
-    found: dict[str, Any] = {
+    placement: dict[str, Any] = {
         "parent_position": (0.1 * n - 0.2, 0.3, -0.1 * n), "parent_quaternion": _TURNS[n],
         "child_position": (-0.1, 0.05 * n + 0.1, 0.2), "child_quaternion": _TURNS[3 - n],
     }  # fmt: skip
-    return found | ({} if parent == "ground" else {"parent_node": "port"})
+    return placement | ({} if parent == "ground" else {"parent_node": "port"})
 
 
 def revolute(tree: SceneBuilder, name: str, parent: str, **more: Any) -> SceneBuilder:
@@ -83,7 +83,7 @@ def driven(tree: SceneBuilder) -> Scene:
     """A chain with its second hinge prescribed, beside a spring."""
     wave = Sine(amplitude=0.5, angular_frequency_rad_s=3.0, phase_rad=0.8)
     moved, scene = angular(prescribed=wave, stiffness=2.0), tree.scene()
-    hinges = [replace(each, rotation=moved) if each.name == "to middle" else each for each in scene.hinges]
+    hinges = [replace(hinge, rotation=moved) if hinge.name == "to middle" else hinge for hinge in scene.hinges]
     return replace(scene, hinges=tuple(hinges))
 
 

@@ -110,13 +110,13 @@ def try_engine(
                 continue
             if event.kind == "ended":
                 continue
-            found: ClauseOutcome = event.content
+            outcome: ClauseOutcome = event.content
             if event.kind in ("crashed", "stopped"):
-                found = ClauseOutcome(clause.name, clause.sentence, "broken", clean(str(event.content)))
-            if found.status == "broken" and not trial.alone:
+                outcome = ClauseOutcome(clause.name, clause.sentence, "broken", clean(str(event.content)))
+            if outcome.status == "broken" and not trial.alone:
                 trials.append(trial._replace(alone=True))
                 continue
-            decided[trial.clause] = found
+            decided[trial.clause] = outcome
             while waiting and waiting[0] in decided:
                 yield decided[waiting.pop(0)]
 
@@ -146,18 +146,20 @@ def verdict_on(outcomes: list[ClauseOutcome], chosen: bool = False) -> ContractV
     The contract is kept if no clause is broken or missing and the essential ones were tried: the form of an answer, and
     a run that is known in closed form.
     """
-    counts = {status: sum(each.status == status for each in outcomes) for status in ("holds", "broken", "not offered")}
-    missing = next((each for each in outcomes if each.status == "missing"), None)
+    counts = {
+        status: sum(outcome.status == status for outcome in outcomes) for status in ("holds", "broken", "not offered")
+    }
+    missing = next((outcome for outcome in outcomes if outcome.status == "missing"), None)
     if missing is not None:
         return ContractVerdict(False, False, missing.message)
-    single = any(each.precision == "single" for each in outcomes)
+    single = any(outcome.precision == "single" for outcome in outcomes)
     which = "clauses that were chosen" if chosen else "clauses"
     text = f"{counts['holds']} of {len(outcomes)} {which} hold{' in single precision' if single else ''}"
     text += f", {counts['broken']} broken"
     if counts["not offered"]:
         text += f", {counts['not offered']} not tried, since it does not offer what they are about"
-    holding = {each.clause for each in outcomes if each.status == "holds"}
-    formal = all(each.clause in holding for each in outcomes if not CLAUSES[each.clause].physical)
+    holding = {outcome.clause for outcome in outcomes if outcome.status == "holds"}
+    formal = all(outcome.clause in holding for outcome in outcomes if not CLAUSES[outcome.clause].physical)
     if counts["broken"]:
         return ContractVerdict(False, not counts["not offered"], text)
     if chosen:
@@ -170,15 +172,15 @@ def verdict_on(outcomes: list[ClauseOutcome], chosen: bool = False) -> ContractV
 def to_offer(outcomes: list[ClauseOutcome]) -> dict[str, list[str]]:
     """For each thing that an engine would have to offer, the clauses that need it."""
     clauses: dict[str, list[str]] = {}
-    for each in outcomes:
-        if each.status == "not offered":
-            clauses.setdefault(each.offer, []).append(each.clause)
+    for outcome in outcomes:
+        if outcome.status == "not offered":
+            clauses.setdefault(outcome.offer, []).append(outcome.clause)
     return clauses
 
 
 def _first_offer(outcomes: list[ClauseOutcome]) -> str:
-    wanted = [each for each in outcomes if each.clause in SHOWN or not CLAUSES[each.clause].physical]
-    return next((each.offer for each in wanted if each.status == "not offered"), "a scene with a known answer")
+    wanted = [outcome for outcome in outcomes if outcome.clause in SHOWN or not CLAUSES[outcome.clause].physical]
+    return next((outcome.offer for outcome in wanted if outcome.status == "not offered"), "a scene with a known answer")
 
 
 def _process(trial: ClauseTrial) -> str:

@@ -45,7 +45,7 @@ def draw(scene: Scene, trails: Sequence[str] | None = None) -> Drawing:
             case _:
                 assert_never(body)
         for wheel in scene.wheels:
-            marker = next((each for each in markers if _turns_with(body, each, wheel)), None)
+            marker = next((marker for marker in markers if _turns_with(body, marker, wheel)), None)
             if wheel.body == body.name and marker is not None:
                 wheels.append(_wheel(body, wheel, marker))
     lines += _masses(scene)
@@ -85,17 +85,17 @@ def _masses(scene: Scene) -> list[Line]:
 def _connectors(scene: Scene) -> list[Line]:
     """Connectors between nodes, and springs along hinges at the hinge points."""
     lines = []
-    for each in scene.connectors:
+    for connector in scene.connectors:
         kind, points = "mount", []
-        if isinstance(each, BetweenNodes):
-            kind = "mount" if hasattr(each, "quaternion_a") else "spring"  # between frames or between points
-            points = [_carried(scene, end.body, end.node, end.position_m) for end in ends(each)]
-        elif isinstance(each, HingeSpring):
-            hinges = [hinge for hinge in scene.hinges if hinge.name == each.hinge]
+        if isinstance(connector, BetweenNodes):
+            kind = "mount" if hasattr(connector, "quaternion_a") else "spring"  # between frames or between points
+            points = [_carried(scene, end.body, end.node, end.position_m) for end in ends(connector)]
+        elif isinstance(connector, HingeSpring):
+            hinges = [hinge for hinge in scene.hinges if hinge.name == connector.hinge]
             points = [_carried(scene, hinge.child, hinge.child_node, hinge.child_position_m) for hinge in hinges]
         seen = tuple(point for point in points if point is not None)
         if seen and len(seen) == len(points):
-            lines.append(Line(body=each.name, kind=kind, points=seen))
+            lines.append(Line(body=connector.name, kind=kind, points=seen))
     return lines
 
 
@@ -103,9 +103,9 @@ def _carried(scene: Scene, body: str, node: str, offset: Vector) -> CarriedPoint
     """A point at a node of a body or of the ground; None if no marker moves with it."""
     if body == GROUND:
         return CarriedPoint("", offset)
-    own = next(each for each in scene.bodies if each.name == body)
+    own = next(candidate for candidate in scene.bodies if candidate.name == body)
     markers = [marker for marker in scene.markers if marker.body == body]
-    marker = next((each for each in markers if isinstance(own, RigidBody) or each.node == node), None)
+    marker = next((marker for marker in markers if isinstance(own, RigidBody) or marker.node == node), None)
     if marker is None:
         return None
     position, rotation = _pose(own, marker)
@@ -160,7 +160,7 @@ def _root_point(scene: Scene, body: Body) -> CarriedPoint | None:
     hinge = next(hinge for hinge in scene.hinges if hinge.child == body.name)
     if hinge.parent == GROUND:
         return CarriedPoint("", hinge.parent_position_m)
-    if not isinstance(next(each for each in scene.bodies if each.name == hinge.parent), RigidBody):
+    if not isinstance(next(body for body in scene.bodies if body.name == hinge.parent), RigidBody):
         return None
     return _carried(scene, hinge.parent, hinge.parent_node, hinge.parent_position_m)
 
@@ -174,7 +174,7 @@ def _corners(body: RigidBody) -> list[Real]:
     squares = 6.0 * (moments.sum() - 2.0 * moments) / max(body.mass_kg, np.finfo(float).tiny)
     sides = np.sqrt(np.maximum(squares, 0.0))
     sides = np.maximum(sides, sides.max(initial=0.0) / LARGEST_ASPECT)
-    signs = [np.array(each) * 2 - 1 for each in np.ndindex(2, 2, 2)]
+    signs = [np.array(corner) * 2 - 1 for corner in np.ndindex(2, 2, 2)]
     return [np.array(body.com_m) + axes @ (0.5 * sides * sign) for sign in signs]
 
 
@@ -186,7 +186,10 @@ def _joints(scene: Scene, body: RigidBody) -> list[Real]:
             points.append(_node_point(body, hinge.child_node, hinge.child_position_m))
         elif hinge.parent == body.name:
             points.append(_node_point(body, hinge.parent_node, hinge.parent_position_m))
-    for each in (*scene.closures, *(each for each in scene.connectors if isinstance(each, BetweenNodes))):
+    for each in (
+        *scene.closures,
+        *(connector for connector in scene.connectors if isinstance(connector, BetweenNodes)),
+    ):
         own = [_node_point(body, end.node, end.position_m) for end in ends(each) if end.body == body.name]
         points += own[:1]  # what joins two points of the body counts at its first
     return points

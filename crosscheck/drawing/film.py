@@ -46,14 +46,14 @@ def film(scene: Scene) -> tuple[Scene, Drawing] | None:
 
 def film_channels(drawing: Drawing) -> tuple[str, ...]:
     carriers = {point.marker for line in drawing.lines for point in line.points if point.marker}
-    found = [
+    channels = [
         f"marker:{name}.{part}"
         for name in dict.fromkeys((*sorted(carriers), *drawing.trails, *(wheel.marker for wheel in drawing.wheels)))
         for part in ("position", "orientation")
     ]
     for wheel in drawing.wheels:
-        found += [f"marker:{wheel.marker}.angular_velocity", f"wheel_load:{wheel.name}.torque"]
-    return tuple(dict.fromkeys(found))
+        channels += [f"marker:{wheel.marker}.angular_velocity", f"wheel_load:{wheel.name}.torque"]
+    return tuple(dict.fromkeys(channels))
 
 
 def _hung(scene: Scene) -> Scene:
@@ -85,7 +85,7 @@ def _with_markers(scene: Scene, body: Body) -> Scene:
         inside = np.linspace(0.0, body.length_m, pieces + 1)[1:-1]
         added = tuple(BeamNode(name=f"{ADDED} {i}", x_m=float(x)) for i, x in enumerate(inside, start=1))
         longer = msgspec.structs.replace(body, nodes=(*body.nodes, *added))
-        bodies = tuple(longer if each.name == body.name else each for each in scene.bodies)
+        bodies = tuple(longer if candidate.name == body.name else candidate for candidate in scene.bodies)
         scene, body = msgspec.structs.replace(scene, bodies=bodies), longer
     nodes = list(rest_frames(body))
     seen = {(marker.body, marker.node) for marker in scene.markers}

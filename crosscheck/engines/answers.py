@@ -79,26 +79,26 @@ def checked_precision(engine: Engine) -> Precision:
     raise BrokenContract(f"precision is {clean(repr(stated))}: it is one of {', '.join(UNIT_ROUNDOFF)}")
 
 
-def checked_version(found: Any) -> str:
+def checked_version(answer: Any) -> str:
     """What `version` returned: text."""
-    text = _text(found, "version()")
+    text = _text(answer, "version()")
     _require(bool(text.strip()), "version() is empty: name the version of the library")
     return text
 
 
-def checked_support(found: Any) -> Support:
+def checked_support(answer: Any) -> Support:
     """What `supports` returned."""
-    _instance(found, Support, "supports()")
-    _one_of(found.kind, ("exact", "surrogate", "no"), "the kind of supports()")
-    return Support(found.kind, _text(found.reason, "the reason of supports()"))
+    _instance(answer, Support, "supports()")
+    _one_of(answer.kind, ("exact", "surrogate", "no"), "the kind of supports()")
+    return Support(answer.kind, _text(answer.reason, "the reason of supports()"))
 
 
-def checked_ladder(found: Any) -> tuple[Effort, ...]:
+def checked_ladder(answer: Any) -> tuple[Effort, ...]:
     """What `efforts` returned: at least three, from coarse to fine for each method."""
-    _require(isinstance(found, tuple | list), f"efforts() is {_named(found)}, not a tuple of efforts")
-    ladder = tuple(_effort(each, f"efforts()[{i}]") for i, each in enumerate(found))
+    _require(isinstance(answer, tuple | list), f"efforts() is {_named(answer)}, not a tuple of efforts")
+    ladder = tuple(_effort(effort, f"efforts()[{i}]") for i, effort in enumerate(answer))
     _require(len(ladder) >= RUNGS, f"efforts() has {len(ladder)} efforts: an uncertainty needs at least {RUNGS}")
-    _require(len({each.label for each in ladder}) == len(ladder), "efforts() has the same effort twice")
+    _require(len({effort.label for effort in ladder}) == len(ladder), "efforts() has the same effort twice")
     finest: dict[tuple[str, str], float] = {}
     for effort in ladder:
         before = finest.setdefault((effort.kind, effort.method), math.inf)
@@ -107,33 +107,33 @@ def checked_ladder(found: Any) -> tuple[Effort, ...]:
     return ladder
 
 
-def checked_model(found: Any) -> Model:
+def checked_model(answer: Any) -> Model:
     """What `compile` returned."""
-    _require(isinstance(found, Model), f"compile() returned {_named(found)}, which is no model")
-    return found
+    _require(isinstance(answer, Model), f"compile() returned {_named(answer)}, which is no model")
+    return answer
 
 
-def checked_run(found: Any, times: Real, scene: Scene) -> Trajectory:
+def checked_run(answer: Any, times: Real, scene: Scene) -> Trajectory:
     """What `simulate` returned for the sample times asked for; an unfinished run is cut to its finite samples."""
-    _instance(found, Trajectory, "simulate()")
-    _one_of(found.status, get_args(Status), "the status")
-    finished, message = found.status == "finished", _text(found.message, "message")
-    _require(finished or bool(message.strip()), f'a "{found.status}" run says in its message when and why')
-    count = _reached(found.times, times, finished)
+    _instance(answer, Trajectory, "simulate()")
+    _one_of(answer.status, get_args(Status), "the status")
+    finished, message = answer.status == "finished", _text(answer.message, "message")
+    _require(finished or bool(message.strip()), f'a "{answer.status}" run says in its message when and why')
+    count = _reached(answer.times, times, finished)
     known = _known(scene)
     run = Trajectory(
-        status=found.status,
+        status=answer.status,
         message=message,
         times=times[:count].copy(),
         markers={
             name: _path(path, f"markers[{name!r}]", count)
-            for name, path in _named_by(found.markers, "markers", _names(scene.markers))
+            for name, path in _named_by(answer.markers, "markers", _names(scene.markers))
         },
-        **{name: _output(getattr(found, name), name, count, known.get(name)) for name in OUTPUTS},
-        wall_s=_number(found.wall_s, "wall_s"),
-        evaluations=_count(found.evaluations),
-        undetermined=_undetermined(found, scene),
-        events=_events(found.events),
+        **{name: _output(getattr(answer, name), name, count, known.get(name)) for name in OUTPUTS},
+        wall_s=_number(answer.wall_s, "wall_s"),
+        evaluations=_count(answer.evaluations),
+        undetermined=_undetermined(answer, scene),
+        events=_events(answer.events),
     )
     wrong = fault_of_linear(run.derivatives, run.frequencies, run.known_to, scene)
     _require(not wrong, wrong)
@@ -147,14 +147,14 @@ def checked_run(found: Any, times: Real, scene: Scene) -> Trajectory:
                 f"markers[{name!r}].quaternion at t = {times[at]:g} s has norm {1.0 + defect[at]:.9g} or its inverse: "
                 "rotations are unit quaternions"
             )
-    return replace(run, envelope=_envelope(found.envelope, run))
+    return replace(run, envelope=_envelope(answer.envelope, run))
 
 
-def _reached(found: Any, times: Real, finished: bool) -> int:
+def _reached(answer: Any, times: Real, finished: bool) -> int:
     """The number of requested samples that were reached. A time summed from T intervals has at most T rounding
     errors."""
-    _require(isinstance(found, np.ndarray) and found.ndim == 1, f"times is {_named(found)} and not an array (T,)")
-    taken = _array(found, "times", len(found))
+    _require(isinstance(answer, np.ndarray) and answer.ndim == 1, f"times is {_named(answer)} and not an array (T,)")
+    taken = _array(answer, "times", len(answer))
     _require(len(taken) <= len(times), f"times has {len(taken)} samples, more than the {len(times)} asked for")
     off = ~(np.abs(taken - times[: len(taken)]) <= len(times) * np.finfo(float).eps * times[-1])
     if np.any(off):
@@ -166,12 +166,12 @@ def _reached(found: Any, times: Real, finished: bool) -> int:
     return len(taken)
 
 
-def _path(found: Any, where: str, count: int) -> MarkerPath:
-    _instance(found, MarkerPath, where)
+def _path(answer: Any, where: str, count: int) -> MarkerPath:
+    _instance(answer, MarkerPath, where)
     return MarkerPath(
-        position=_array(found.position, f"{where}.position", count, 3),
-        quaternion=_array(found.quaternion, f"{where}.quaternion", count, 4),
-        velocity=_array(found.velocity, f"{where}.velocity", count, 6),
+        position=_array(answer.position, f"{where}.position", count, 3),
+        quaternion=_array(answer.quaternion, f"{where}.quaternion", count, 4),
+        velocity=_array(answer.velocity, f"{where}.velocity", count, 6),
     )
 
 
@@ -182,41 +182,41 @@ def _known(scene: Scene) -> dict[str, set[str]]:
         "loads": hinges | _names(scene.constraints) | _names(scene.point_masses),
         "wheel_loads": wheels,
         "drives": hinges | wheels | _names(scene.point_masses),
-        "connectors": _names(each for each in scene.connectors if isinstance(each, BetweenNodes)),
-        "hinge_forces": _names(each for each in scene.connectors if not isinstance(each, BetweenNodes)),
+        "connectors": _names(connector for connector in scene.connectors if isinstance(connector, BetweenNodes)),
+        "hinge_forces": _names(connector for connector in scene.connectors if not isinstance(connector, BetweenNodes)),
         "energy": set(ENERGIES),
         "derivatives": set(DERIVATIVES),
         "known_to": {*DERIVATIVES, FREQUENCIES},
     }
 
 
-def _output(found: Any, where: str, count: int, known: set[str] | None) -> Any:
+def _output(answer: Any, where: str, count: int, known: set[str] | None) -> Any:
     """An output of a run as plain arrays: by name if only `known` items can have it, else one array or None."""
     columns = OUTPUTS[where]
     if known is not None:
-        named = _named_by(found, where, known)
+        named = _named_by(answer, where, known)
         return {name: _array(values, f"{where}[{name!r}]", count, *columns) for name, values in named}
-    return None if found is None else _array(found, where, count, *columns)
+    return None if answer is None else _array(answer, where, count, *columns)
 
 
-def _named_by(found: Any, where: str, known: set[str]) -> list[tuple[str, Any]]:
+def _named_by(answer: Any, where: str, known: set[str]) -> list[tuple[str, Any]]:
     """The items of a mapping all of whose keys must be known names."""
-    _require(isinstance(found, Mapping), f"{where} is {_named(found)}, not a mapping")
+    _require(isinstance(answer, Mapping), f"{where} is {_named(answer)}, not a mapping")
     there = ", ".join(sorted(known)) or "none"
-    for name in found:
+    for name in answer:
         _require(isinstance(name, str) and name in known, f"{where} has {name!r}, and the scene has {there}")
-    return list(found.items())
+    return list(answer.items())
 
 
-def _array(found: Any, where: str, count: int, *width: int | None) -> Real:
+def _array(answer: Any, where: str, count: int, *width: int | None) -> Real:
     """A float64 copy of an array (count, *width) of real numbers; a width of None may be any."""
-    plain = isinstance(found, np.ndarray) and not isinstance(found, np.ma.MaskedArray)
-    _require(plain, f"{where} is {_named(found)}, not an array")
-    _require(found.dtype.kind in "fiu", f"{where} is of dtype {found.dtype}, not of real numbers")
-    shape = (count, *(n if n is not None else found.shape[-1] for n in width if found.ndim))
-    right = found.shape == shape and 0 not in shape[1:]
-    _require(right, f"{where} has shape {found.shape}; {_shape(count, width)} was expected")
-    return np.array(found, dtype=np.float64, order="C", subok=False)
+    plain = isinstance(answer, np.ndarray) and not isinstance(answer, np.ma.MaskedArray)
+    _require(plain, f"{where} is {_named(answer)}, not an array")
+    _require(answer.dtype.kind in "fiu", f"{where} is of dtype {answer.dtype}, not of real numbers")
+    shape = (count, *(n if n is not None else answer.shape[-1] for n in width if answer.ndim))
+    right = answer.shape == shape and 0 not in shape[1:]
+    _require(right, f"{where} has shape {answer.shape}; {_shape(count, width)} was expected")
+    return np.array(answer, dtype=np.float64, order="C", subok=False)
 
 
 def _finite_samples(run: Trajectory, finished: bool) -> int:
@@ -231,32 +231,32 @@ def _finite_samples(run: Trajectory, finished: bool) -> int:
     return count
 
 
-def _undetermined(found: Trajectory, scene: Scene) -> tuple[str, ...]:
+def _undetermined(answer: Trajectory, scene: Scene) -> tuple[str, ...]:
     """The names of undetermined channels, which must be loads or drives of the run.
 
     Only redundant closures leave loads undetermined, so on a tree the claim itself is a breach: it would hide its
     author's numbers, and take those of all other engines out of the comparison.
     """
-    _instance(found.undetermined, tuple, "undetermined")
-    there = {f"load:{name}.{part}" for name in found.loads for part in LOAD_PARTS}
-    there |= {f"drive:{name}" for name in found.drives}
-    for each in found.undetermined:
+    _instance(answer.undetermined, tuple, "undetermined")
+    there = {f"load:{name}.{part}" for name in answer.loads for part in LOAD_PARTS}
+    there |= {f"drive:{name}" for name in answer.drives}
+    for each in answer.undetermined:
         right = isinstance(each, str) and each in there
         _require(right, f"undetermined has {each!r:.80}: it names channels of loads and drives that the run has")
         _require(
             bool(scene.constraints),
             f"undetermined has {each!r:.80}: the scene has no closures or couplings: the motion determines its loads",
         )
-    return tuple(sorted(set(found.undetermined)))
+    return tuple(sorted(set(answer.undetermined)))
 
 
-def _events(found: Any) -> tuple[tuple[str, float], ...]:
+def _events(answer: Any) -> tuple[tuple[str, float], ...]:
     """Names and times (s) of what happened in a run."""
-    _instance(found, tuple, "events")
-    for each in found:
-        right = isinstance(each, tuple) and len(each) == 2 and isinstance(each[0], str)
-        _require(right, f"events has {each!r:.80}: it holds names with times")
-    return tuple((clean(name), _instant(t)) for name, t in found)
+    _instance(answer, tuple, "events")
+    for pair in answer:
+        right = isinstance(pair, tuple) and len(pair) == 2 and isinstance(pair[0], str)
+        _require(right, f"events has {pair!r:.80}: it holds names with times")
+    return tuple((clean(name), _instant(t)) for name, t in answer)
 
 
 def _instant(t: Any) -> float:
@@ -265,11 +265,11 @@ def _instant(t: Any) -> float:
     return float(t)
 
 
-def _envelope(found: Any, run: Trajectory) -> dict[str, Real]:
+def _envelope(answer: Any, run: Trajectory) -> dict[str, Real]:
     """The envelope of a finished run, which contains the samples of each of its channels."""
     channels, checked = channels_of(run) if run.status == "finished" else {}, {}
     known = {name for name in channels if has_extremes(name) and name not in run.undetermined}
-    for name, rows in _named_by(found, "envelope", known):
+    for name, rows in _named_by(answer, "envelope", known):
         where = f"envelope[{name!r}]"
         _require(isinstance(rows, np.ndarray) and rows.ndim == 2, f"{where} is {_named(rows)} and not an array (5, k)")
         checked[name] = _array(rows, where, len(rows), None)
@@ -291,55 +291,57 @@ def _signals(run: Trajectory) -> Iterator[tuple[str, Real]]:
         for part in fields(path):
             yield f"markers[{name!r}].{part.name}", getattr(path, part.name)
     for output in OUTPUTS:
-        found = getattr(run, output)
+        signals = getattr(run, output)
         if output == "known_to":
             continue  # an engine may say that it does not know: infinity
-        if isinstance(found, dict):
-            for name, values in found.items():
+        if isinstance(signals, dict):
+            for name, values in signals.items():
                 yield f"{output}[{name!r}]", _determined(run, output, name, values)
-        elif found is not None:
-            yield output, found
+        elif signals is not None:
+            yield output, signals
 
 
-def _effort(found: Any, where: str) -> Effort:
-    _instance(found, Effort, where)
-    _one_of(found.kind, ("tolerance", "step"), f"{where}.kind")
-    method = _text(found.method, f"{where}.method")
-    value = _number(found.value, f"{where}.value")
+def _effort(answer: Any, where: str) -> Effort:
+    _instance(answer, Effort, where)
+    _one_of(answer.kind, ("tolerance", "step"), f"{where}.kind")
+    method = _text(answer.method, f"{where}.method")
+    value = _number(answer.value, f"{where}.value")
     _require(value > 0.0, f"{where}.value is {value:g}: a tolerance or a step (s) is positive")
-    return Effort(found.kind, value, method)
+    return Effort(answer.kind, value, method)
 
 
-def _one_of(found: Any, words: tuple[str, ...], where: str) -> None:
-    right = isinstance(found, str) and found in words
-    _require(right, f"{where} is {found!r:.80}: it is one of {', '.join(words)}")
+def _one_of(answer: Any, words: tuple[str, ...], where: str) -> None:
+    right = isinstance(answer, str) and answer in words
+    _require(right, f"{where} is {answer!r:.80}: it is one of {', '.join(words)}")
 
 
-def _text(found: Any, where: str) -> str:
-    _require(isinstance(found, str), f"{where} is {_named(found)}, not text")
-    return clean(found)
+def _text(answer: Any, where: str) -> str:
+    _require(isinstance(answer, str), f"{where} is {_named(answer)}, not text")
+    return clean(answer)
 
 
-def _number(found: Any, where: str) -> float:
-    is_number = isinstance(found, numbers.Real) and not isinstance(found, bool)
-    _require(is_number, f"{where} is {_named(found)}, not a number")
-    value = float(found)
+def _number(answer: Any, where: str) -> float:
+    is_number = isinstance(answer, numbers.Real) and not isinstance(answer, bool)
+    _require(is_number, f"{where} is {_named(answer)}, not a number")
+    value = float(answer)
     _require(math.isfinite(value) and value >= 0.0, f"{where} is {value:g}: a finite number from 0 is expected")
     return value
 
 
-def _count(found: Any) -> int:
-    whole = isinstance(found, numbers.Integral) and not isinstance(found, bool)
-    _require(whole and 0 <= found <= LARGEST_COUNT, f"evaluations is {found!r:.40}: a whole number from 0 is expected")
-    return int(found)
+def _count(answer: Any) -> int:
+    whole = isinstance(answer, numbers.Integral) and not isinstance(answer, bool)
+    _require(
+        whole and 0 <= answer <= LARGEST_COUNT, f"evaluations is {answer!r:.40}: a whole number from 0 is expected"
+    )
+    return int(answer)
 
 
-def _instance(found: Any, kind: type, where: str) -> None:
-    _require(isinstance(found, kind), f"{where} returned {_named(found)}, not a {kind.__name__}")
+def _instance(answer: Any, kind: type, where: str) -> None:
+    _require(isinstance(answer, kind), f"{where} returned {_named(answer)}, not a {kind.__name__}")
 
 
-def _named(found: Any) -> str:
-    return "None" if found is None else f"a {type(found).__name__}"
+def _named(answer: Any) -> str:
+    return "None" if answer is None else f"a {type(answer).__name__}"
 
 
 def _names(items: Iterable[Any]) -> set[str]:

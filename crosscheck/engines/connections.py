@@ -108,7 +108,9 @@ def _law(connector: PeerLine) -> Callable[[float, Moving, Moving], tuple[Real, f
 
 
 def connections(scene: Scene, chain: tuple[Link, ...]) -> tuple[Connection, ...]:
-    return tuple(Connection(scene, chain, each) for each in scene.connectors if isinstance(each, PeerLine))
+    return tuple(
+        Connection(scene, chain, connector) for connector in scene.connectors if isinstance(connector, PeerLine)
+    )
 
 
 def along_hinges(scene: Scene) -> list[tuple[str, str, int, Callable[[float, float, float], Along]]]:
@@ -129,8 +131,8 @@ def law_of(stems: dict[str, Any]) -> Law:
     powers = [stems["preload"], stems["stiffness"], *stems["stiffening"]]
 
     def by_powers(x: float) -> tuple[float, float]:
-        load = sum(each * x**n for n, each in enumerate(powers))
-        return load, sum(each * x ** (n + 1) / (n + 1) for n, each in enumerate(powers))
+        load = sum(power * x**n for n, power in enumerate(powers))
+        return load, sum(power * x ** (n + 1) / (n + 1) for n, power in enumerate(powers))
 
     return by_powers
 
@@ -236,8 +238,9 @@ def _along(connector: PeerAlong) -> Callable[[float, float, float], Along]:
 def _spring(connector: HingeSpring) -> Callable[[float, float, float], Along]:
     stems = by_stem(connector)
     law = law_of(stems)
-    lower, upper = (-inf if stems["lower"] is None else stems["lower"]), (
-        inf if stems["upper"] is None else stems["upper"]
+    lower, upper = (
+        (-inf if stems["lower"] is None else stems["lower"]),
+        (inf if stems["upper"] is None else stems["upper"]),
     )
     k, e = stems["stop_stiffness"], stems["stop_dissipation"]
     push = actuator(connector)

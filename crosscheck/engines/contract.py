@@ -165,7 +165,7 @@ class Trajectory:
 
 
 OUTPUTS: dict[str, tuple[int | None, ...]] = {
-    each.name: each.metadata["columns"] for each in fields(Trajectory) if "columns" in each.metadata
+    field.name: field.metadata["columns"] for field in fields(Trajectory) if "columns" in field.metadata
 }
 """The outputs of a run other than markers, with the shape of each array without its axis of T samples; None is any."""
 LINEAR = ("derivatives", "frequencies", "known_to")

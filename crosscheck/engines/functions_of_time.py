@@ -109,8 +109,8 @@ def scene_functions(scene: Scene) -> list[Function]:
             for key in item.__struct_fields__:
                 visit(getattr(item, key))
         elif isinstance(item, tuple):
-            for each in item:
-                visit(each)
+            for element in item:
+                visit(element)
 
     for part in (scene.hinges, scene.wheels, scene.point_masses, scene.loads, scene.connectors):
         visit(part)
@@ -202,6 +202,6 @@ def _table(times: tuple[float, ...], values: tuple[float, ...]) -> Callable[[flo
 
     spline = make_interp_spline(times, values, k=5)
     derivatives = (spline, spline.derivative(1), spline.derivative(2))
-    for each in derivatives:
-        each.extrapolate = False
-    return lambda t: Profile(*(float(each(t)) for each in derivatives))
+    for derivative in derivatives:
+        derivative.extrapolate = False
+    return lambda t: Profile(*(float(derivative(t)) for derivative in derivatives))

@@ -144,7 +144,7 @@ def obstacle(
 def first_screw(scene: Scene) -> str:
     """The first hinge that turns and shifts by one coordinate, "" where there is none."""
     for hinge in scene.hinges:
-        if any(isinstance(each, ScalarFreedom) and each.motion == "screw" for each in hinge.freedoms):
+        if any(isinstance(freedom, ScalarFreedom) and freedom.motion == "screw" for freedom in hinge.freedoms):
             return hinge.name
     return ""
 
@@ -184,7 +184,7 @@ def links(scene: Scene) -> tuple[Link, ...]:
 def attachment(scene: Scene, chain: tuple[Link, ...], item: Marker | Load) -> Attachment:
     """Where a marker or the node of a load is fixed."""
     index = next(i for i, link in enumerate(chain) if link.kind == "body" and link.name == item.body)
-    body = next(each for each in scene.bodies if each.name == item.body)
+    body = next(body for body in scene.bodies if body.name == item.body)
     offset = item.offset_m if isinstance(item, Marker) else ZERO
     return Attachment(index, chain[index].body @ offset_frame(body, item.node, offset))
 
@@ -222,7 +222,7 @@ def _closed_frame(scene: Scene, chain: tuple[Link, ...], end: EndFrame) -> Attac
 
 def freedoms(item: Hinge | PointMass | Wheel) -> tuple[Freedom, ...]:
     """The elementary joints of a hinge, a point mass or a wheel, base to tip; none for a weld."""
-    return tuple(_scalar(each) if isinstance(each, ScalarFreedom) else each for each in item.freedoms)
+    return tuple(_scalar(freedom) if isinstance(freedom, ScalarFreedom) else freedom for freedom in item.freedoms)
 
 
 def _scalar(freedom: ScalarFreedom) -> Scalar:

@@ -138,9 +138,7 @@ frisch = partial(NativeEngine, "native-frisch", "frisch", "flexmb: Frisch's equa
 frisch_as_printed = partial(
     NativeEngine, "native-frisch-as-printed", "frisch_as_printed", "flexmb: the same as printed, errors included"
 )
-radau5 = partial(
-    NativeEngine, "native-radau5", "articulated", "flexmb, integrated by Radau IIA of order 5", "radau5"
-)
+radau5 = partial(NativeEngine, "native-radau5", "articulated", "flexmb, integrated by Radau IIA of order 5", "radau5")
 exponential = partial(
     NativeEngine, "native-exponential", "articulated", "flexmb, integrated by exponential collocation", "exponential"
 )
@@ -201,7 +199,7 @@ class NativeModel:
             algorithm=self._algorithm,
             **accuracy,
         )
-        found = Trajectory(
+        trajectory = Trajectory(
             status=_status(done, run.t_start),
             message="" if done.finished else done.message,
             times=done.t,
@@ -214,18 +212,20 @@ class NativeModel:
             undetermined=tuple(_undetermined(done)),
             events=tuple((event.name, event.t) for event in done.events),
         )
-        found = first_samples(found, int(np.isin(done.t, run.times).sum()))  # Zeno events end a run between samples
-        states = (done.state_at(sample) for sample in range(len(found.times)))
+        trajectory = first_samples(
+            trajectory, int(np.isin(done.t, run.times).sum())
+        )  # Zeno events end a run between samples
+        states = (done.state_at(sample) for sample in range(len(trajectory.times)))
         asked = linear_outputs(self._system, self._algorithm, states, run.linear)
-        extremes = _extremes(done.envelope, found) if run.envelope and found.status == "finished" else {}
-        return replace(found, envelope=extremes, **asked.as_outputs)
+        extremes = _extremes(done.envelope, trajectory) if run.envelope and trajectory.status == "finished" else {}
+        return replace(trajectory, envelope=extremes, **asked.as_outputs)
 
 
 def _extremes(envelope: Envelope, run: Trajectory) -> dict[str, Real]:
     """The envelope by channel, as rows of `crosscheck.engines.extremes`: channels cut it as they cut samples."""
 
-    def rows(found: Extremes) -> Real:
-        return np.array([found.least, found.t_least, found.greatest, found.t_greatest, found.error])
+    def rows(parts: Extremes) -> Real:
+        return np.array([parts.least, parts.t_least, parts.greatest, parts.t_greatest, parts.error])
 
     def of(parts: dict[str, Extremes]) -> dict[str, Real]:
         return {name: rows(found) for name, found in parts.items()}
@@ -239,10 +239,10 @@ def _extremes(envelope: Envelope, run: Trajectory) -> dict[str, Real]:
         connectors=of(envelope.connectors), hinge_forces=of(envelope.hinge_forces),
         energy={kind: found[:, 0] for kind, found in energy.items()}, momentum=rows(envelope.momentum),
     )  # fmt: skip
-    found = channels_of(seen) | ({"energy.total": energy["total"]} if run.energy else {})
+    channels = channels_of(seen) | ({"energy.total": energy["total"]} if run.energy else {})
     return {
         name: np.hstack([values, *([rows(envelope.magnitudes[name])] if is_vector(name) else [])])
-        for name, values in found.items()
+        for name, values in channels.items()
         if has_extremes(name) and name not in run.undetermined
     }
 
@@ -277,7 +277,10 @@ def _fastest_mode(scene: Scene) -> float:
         if isinstance(body, BeamBody | ModalBody) and body.level != "rigid"
     ]
     return max(
-        (fastest_mode(each.mass, each.translation, each.inertia, each.rotation, each.stiffness) for each in models),
+        (
+            fastest_mode(model.mass, model.translation, model.inertia, model.rotation, model.stiffness)
+            for model in models
+        ),
         default=0.0,
     )
 

@@ -37,8 +37,10 @@ def linear_outputs(
         return NOTHING
     equations = Equations(system)
     order = places(coordinate_names(scene), [name for name, _ in equations.labels.displacements])
-    found = _exactly(equations, states) if algorithm == "articulated" else _by_differences(equations, algorithm, states)
-    return outputs(asked, (at.ordered(order) for at in found), _offered(algorithm))
+    derivatives = (
+        _exactly(equations, states) if algorithm == "articulated" else _by_differences(equations, algorithm, states)
+    )
+    return outputs(asked, (at.ordered(order) for at in derivatives), _offered(algorithm))
 
 
 def _of_closed(system: System, states: Iterable[State]) -> LinearOutputs:
@@ -90,5 +92,3 @@ def _differenced(equations: Equations, at: Variations, accelerations: Evaluator)
     by_speed, asunder = differentiated(hurried, n, noise)
     errors = Errors(apart, asunder, unit * norm(by_force))
     return LinearMatrices(by_displacement, by_speed, by_force, at.transport, errors)
-
-

@@ -168,8 +168,8 @@ def _fastest(stiffness: Real, mass: Real) -> float:
     size = np.sqrt(np.diag(mass)[massive])
     K, M = (matrix[np.ix_(massive, massive)] / np.outer(size, size) for matrix in (stiffness, mass))
     last = len(size) - 1
-    found = eigh(K, M + _ROUNDING * np.eye(len(size)), eigvals_only=True, subset_by_index=[last, last])
-    return float(np.sqrt(max(found[0], 0.0)))
+    eigenvalues = eigh(K, M + _ROUNDING * np.eye(len(size)), eigvals_only=True, subset_by_index=[last, last])
+    return float(np.sqrt(max(eigenvalues[0], 0.0)))
 
 
 def _turning(freedom: Freedom | None, duration_s: float) -> float:

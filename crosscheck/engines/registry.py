@@ -95,10 +95,10 @@ def engines() -> Engines:
     An engine without its library raises `EngineMissing` from `version`, and so does a plug-in that cannot be imported.
     A plug-in that cannot be loaded for another reason raises `BrokenPlugIn`. Built-in names take precedence.
     """
-    found: dict[str, Callable[[], Engine]] = {name: partial(_built_in, path) for name, path in BUILT_IN.items()}
+    providers: dict[str, Callable[[], Engine]] = {name: partial(_built_in, path) for name, path in BUILT_IN.items()}
     for name, points in _plug_ins().items():
-        found[name] = partial(_plugged, name, points)
-    return Engines(found)
+        providers[name] = partial(_plugged, name, points)
+    return Engines(providers)
 
 
 def plug_ins() -> tuple[str, ...]:
@@ -169,4 +169,4 @@ def _plugged(name: str, points: list[EntryPoint]) -> Engine:
 
 def _lacking(made: object) -> str:
     """The members of the contract that an object lacks."""
-    return ", ".join(each for each in ("name", "version", "supports", "efforts", "compile") if not hasattr(made, each))
+    return ", ".join(word for word in ("name", "version", "supports", "efforts", "compile") if not hasattr(made, word))

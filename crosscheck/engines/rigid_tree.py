@@ -38,10 +38,10 @@ Places = slice | NDArray[np.intp]
 
 def places(numbers: ArrayLike) -> Places:
     """Indices of entries of an array; consecutive ones as a slice, which takes a third of the time."""
-    found = np.asarray(numbers, dtype=np.intp)
-    if len(found) == 0:
+    indices = np.asarray(numbers, dtype=np.intp)
+    if len(indices) == 0:
         return slice(0, 0)
-    return slice(int(found[0]), int(found[-1]) + 1) if np.all(np.diff(found) == 1) else found
+    return slice(int(indices[0]), int(indices[-1]) + 1) if np.all(np.diff(indices) == 1) else indices
 
 
 def as_it_is(quaternion: Real) -> Real:
@@ -153,7 +153,7 @@ class FreeCoordinates(Generic[AnySlot]):
         q, v, driven = np.empty(self._nq), np.empty(self._nv), self._none
         q[self._free_q], v[self.free_v] = y[: self._count], y[self._count : -1]
         if self._motions:
-            motion = np.array([each(t) for each in self._motions])
+            motion = np.array([motion(t) for motion in self._motions])
             q[self._driven_q], v[self.driven_v], driven = motion[:, 0], motion[:, 1], motion[:, 2]
         for _, place, _ in self.turning:
             quaternion = q[place]
@@ -168,9 +168,7 @@ class FreeCoordinates(Generic[AnySlot]):
 class JointForces:
     """Generalised forces (nv,) of springs, of dampers and of motors; `quaternion` makes a peer's scalar first."""
 
-    def __init__(
-        self, slots: Sequence[Slot], nv: int, quaternion: Callable[[Real], Real] = as_it_is
-    ) -> None:
+    def __init__(self, slots: Sequence[Slot], nv: int, quaternion: Callable[[Real], Real] = as_it_is) -> None:
         single = scalars(slots)
         sprung = [slot for slot in single if slot.freedom.stiffness]
         damped = [slot for slot in single if slot.freedom.damping]
@@ -255,12 +253,12 @@ def placed_couplings(scene: Scene, slots: Sequence[Slot]) -> tuple[PlacedCouplin
     for slot in slots:
         if isinstance(slot.freedom, Scalar):
             scalars.setdefault(slot.link.joint, []).append(slot)
-    found = []
+    placed = []
     for coupling in scene.couplings:
         related = coupled(scene, coupling)
-        own = tuple(scalars[each.hinge.name][each.place] for each in related)
-        found.append(PlacedCoupling(coupling.name, own, tuple(each.factor for each in related), coupling.offset))
-    return tuple(found)
+        own = tuple(scalars[member.hinge.name][member.place] for member in related)
+        placed.append(PlacedCoupling(coupling.name, own, tuple(member.factor for member in related), coupling.offset))
+    return tuple(placed)
 
 
 def placed_loads(scene: Scene, links: tuple[Link, ...]) -> list[tuple[int, PointLoad]]:
@@ -307,12 +305,14 @@ class TreeConnectors:
 
     def exerted(self, t: float, frame: Callable[[Attachment], Moving]) -> dict[str, Exerted]:
         """What each connector between nodes does; `frame` gives the motion of a frame on a link."""
-        return {each.name: each.exerted(t, frame(each.a), frame(each.b)) for each in self.between}
+        return {
+            connector.name: connector.exerted(t, frame(connector.a), frame(connector.b)) for connector in self.between
+        }
 
     def loads(self, exerted: dict[str, Exerted]) -> Iterable[tuple[Attachment, Real]]:
         """The frames on links on which they act, with [torque; force] (6,) about the frame in World axes."""
-        for each in self.between:
-            for at, load in ((each.a, exerted[each.name].on_a), (each.b, exerted[each.name].on_b)):
+        for connector in self.between:
+            for at, load in ((connector.a, exerted[connector.name].on_a), (connector.b, exerted[connector.name].on_b)):
                 if at.link >= 0:
                     yield at, load
 
@@ -331,7 +331,7 @@ def by_joint(slots: Iterable[Slot], loads: Iterable[float]) -> dict[str, Real]:
 
 def of_kind(kind: str, wrenches: dict[tuple[str, str], Real]) -> dict[str, Real]:
     """The wrenches of one kind of link, "body" or "wheel", by the name of their joint."""
-    return {name: wrench for (each, name), wrench in wrenches.items() if each == kind}
+    return {name: wrench for (kind_of_wrench, name), wrench in wrenches.items() if kind_of_wrench == kind}
 
 
 class ConnectorOutputs(NamedTuple):
@@ -344,6 +344,8 @@ class ConnectorOutputs(NamedTuple):
 
 def connector_outputs(exerted: dict[str, Exerted], along: dict[str, tuple[int, Along]]) -> ConnectorOutputs:
     """What a snapshot says of connectors."""
-    stored = sum(each.energy for each in exerted.values()) + sum(each.energy for _, each in along.values())
-    between = {name: each.on_b for name, each in exerted.items()}
-    return ConnectorOutputs(stored, between, {name: np.array([each.load]) for name, (_, each) in along.items()})
+    stored = sum(exerted_by.energy for exerted_by in exerted.values()) + sum(each.energy for _, each in along.values())
+    between = {name: on_both.on_b for name, on_both in exerted.items()}
+    return ConnectorOutputs(
+        stored, between, {name: np.array([along_hinge.load]) for name, (_, along_hinge) in along.items()}
+    )

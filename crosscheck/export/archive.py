@@ -45,24 +45,24 @@ def archive(cases: Sequence[Case]) -> dict[str, str]:
 
     CaseError names what cannot be exported.
     """
-    found: dict[str, str] = {}
+    texts: dict[str, str] = {}
     rows = []
     for case in cases:
         own, others = case_files(case)
-        found |= {f"{case.name}/{name}": text for name, text in own.items()}
+        texts |= {f"{case.name}/{name}": text for name, text in own.items()}
         rows.append((case, others))
-    found |= {f"schemas/{name}": text for name, text in schema_files().items()}
-    found |= {
+    texts |= {f"schemas/{name}": text for name, text in schema_files().items()}
+    texts |= {
         "README.md": collection_page(rows),
         "LICENSE": _read(shipped_folder() / "LICENSE"),
         "CITATION.cff": citation_cff(),
         "datacite.json": datacite(cases),
         ".zenodo.json": zenodo(cases),
     }
-    for each in files("crosscheck.export").joinpath(PROGRAM).iterdir():
-        if each.name.endswith(".py"):
-            found[f"{PROGRAM}/{each.name}"] = each.read_text(encoding="utf-8")
-    return dict(sorted(found.items())) | {SUMS: checksums(found)}
+    for file in files("crosscheck.export").joinpath(PROGRAM).iterdir():
+        if file.name.endswith(".py"):
+            texts[f"{PROGRAM}/{file.name}"] = file.read_text(encoding="utf-8")
+    return dict(sorted(texts.items())) | {SUMS: checksums(texts)}
 
 
 def case_files(case: Case) -> tuple[dict[str, str], dict[str, Written]]:
@@ -74,20 +74,20 @@ def case_files(case: Case) -> tuple[dict[str, str], dict[str, Written]]:
         data, modal = model_data(scene)
     except (SceneError, CaseError) as error:
         raise CaseError(f"{case.name}: {error}") from None
-    found = {"model.json": _json(data)}
+    files = {"model.json": _json(data)}
     for body, content in modal.items():
         name = modal_file(body)
-        if name in found:
+        if name in files:
             raise CaseError(f'{case.name}: body "{body}" and another one would be written to {name}: rename one')
-        found[name] = _json(content)
+        files[name] = _json(content)
     others = {kind: writer(scene, case.name.replace("/", "_")) for kind, (writer, _) in OTHERS.items()}
     for kind, written in others.items():
         if written.text:
-            found[OTHERS[kind][1]] = written.text
-    found[VALUES] = values_text(reference.times, reference.channels)
-    found["uncertainty.csv"] = uncertainty_text(reference)
-    found["README.md"] = case_page(case, reference, others, {kind: file for kind, (_, file) in OTHERS.items()})
-    return found, others
+            files[OTHERS[kind][1]] = written.text
+    files[VALUES] = values_text(reference.times, reference.channels)
+    files["uncertainty.csv"] = uncertainty_text(reference)
+    files["README.md"] = case_page(case, reference, others, {kind: file for kind, (_, file) in OTHERS.items()})
+    return files, others
 
 
 def uncertainty_text(reference: StoredReference) -> str:

@@ -70,7 +70,7 @@ def tree_data(scene: Scene) -> Data:
         "modal_states": {
             state.body: {"coordinates": state.coordinates, "rates": state.rates} for state in scene.modal_states
         },
-        "beams": _plain([each for each in scene.bodies if isinstance(each, BeamBody) and each.level == "exact"]),
+        "beams": _plain([body for body in scene.bodies if isinstance(body, BeamBody) and body.level == "exact"]),
         "loads": _plain(scene.loads),
         "markers": _plain(scene.markers),
     }
@@ -139,7 +139,7 @@ def _hinge(hinge: Hinge) -> Data:
         "parent_offset": _frame(hinge.parent_position_m, hinge.parent_quaternion),
         "child": hinge.child, "child_node": hinge.child_node,
         "child_offset": _frame(hinge.child_position_m, hinge.child_quaternion),
-        "freedoms": [_freedom(each) for each in hinge.freedoms],
+        "freedoms": [_freedom(freedom) for freedom in hinge.freedoms],
     }  # fmt: skip
 
 
@@ -148,7 +148,7 @@ def _leaf(item: Wheel | PointMass, body: str, kind: str) -> Data:
     return {
         "name": item.name, "kind": kind, "parent": item.body, "parent_node": item.node,
         "parent_offset": _frame(item.offset_m, IDENTITY), "child": body, "child_node": "origin",
-        "child_offset": _frame(ZERO, IDENTITY), "freedoms": [_freedom(each) for each in item.freedoms],
+        "child_offset": _frame(ZERO, IDENTITY), "freedoms": [_freedom(freedom) for freedom in item.freedoms],
     }  # fmt: skip
 
 

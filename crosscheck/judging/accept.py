@@ -30,8 +30,8 @@ def accept_figures(cases: Iterable[Case], records: Path, partial: bool) -> list[
     appended to the records. Raises NotAccepted and writes nothing unless all is as expected.
     """
     cases = tuple(cases)
-    found = last_session(read(records))
-    outcome = conclude(collect(found))
+    session = last_session(read(records))
+    outcome = conclude(collect(session))
     if not outcome.ok:
         raise NotAccepted(f"Nothing is accepted. {outcome.headline}: correct that first.")
     if outcome.idle:
@@ -39,7 +39,7 @@ def accept_figures(cases: Iterable[Case], records: Path, partial: bool) -> list[
     own = [verdict for verdict in (*outcome.loosened, *outcome.own_failures) if recordable(verdict, BUILT_IN)]
     if own:
         raise NotAccepted(f"Nothing is accepted: {own[0].case} was judged by goals or expectations that are your own.")
-    latest = {record.case: record for record in found if isinstance(record, CaseRecord)}
+    latest = {record.case: record for record in session if isinstance(record, CaseRecord)}
     written = []
     archive = Archive(records)
     try:

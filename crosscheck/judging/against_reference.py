@@ -53,7 +53,7 @@ class ReferenceSignals:
 
 def of_stored(reference: StoredReference) -> ReferenceSignals:
     """The signals of a reference that was read from its files."""
-    known = {name: each.uncertainty for name, each in reference.knowledge.channels.items()}
+    known = {name: channel.uncertainty for name, channel in reference.knowledge.channels.items()}
     return ReferenceSignals(reference.times, reference.channels, known)
 
 
@@ -86,8 +86,12 @@ def judge_reference(case: CaseResults) -> Iterator[Verdict]:
 
 
 def hold(
-    result: Result, reference: ReferenceSignals, asked: ReferenceGoals, undetermined: Collection[str] = (),
-    like: Result | None = None, goal_of: Callable[[str, float], float] = lambda channel, goal: goal,
+    result: Result,
+    reference: ReferenceSignals,
+    asked: ReferenceGoals,
+    undetermined: Collection[str] = (),
+    like: Result | None = None,
+    goal_of: Callable[[str, float], float] = lambda channel, goal: goal,
     coordinates: Sequence[str] = (),
 ) -> Iterator[tuple[str, float, Finding]]:
     """The finding on every channel of the reference that has a goal, with that goal. Never raises.
@@ -119,8 +123,8 @@ def hold(
             scale = asked.scales[scaled] if scaled is not None else None
             own = at_samples(result.control_signal(channel, like or result, across=False), places)
             stored = reference.signal(channel)
-            found = compare(channel, own, stored, goal_of(channel, goal), scale)
-            apart = with_worst_entry(found, channel, own.values, stored.values, reference.times, coordinates)
+            verdict = compare(channel, own, stored, goal_of(channel, goal), scale)
+            apart = with_worst_entry(verdict, channel, own.values, stored.values, reference.times, coordinates)
             yield channel, goal, apart
         elif not channel.startswith("energy."):
             yield channel, goal, Finding("refused", f"{result.engine} does not offer {channel}")

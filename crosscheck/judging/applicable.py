@@ -52,25 +52,26 @@ class Inapplicable:
 def set_apart(case: CaseResults, verdicts: Iterable[Verdict]) -> tuple[list[Verdict], tuple[Inapplicable, ...]]:
     """The verdicts that count, and what is not applicable, each only once."""
     joined = {engine for engine in case.case.joined if not _has_figures(case, engine)}
-    refused = [each for each in case.results.values() if each.status == "refused" and each.engine in joined]
-    found = {_inapplicable(case, result, ""): None for result in refused}
+    refused = [result for result in case.results.values() if result.status == "refused" and result.engine in joined]
+    absences = {_inapplicable(case, result, ""): None for result in refused}
     counting: list[Verdict] = []
     for verdict in verdicts:
         open_ = case.undetermined(verdict.variant_a, verdict.variant_b)
         if verdict.status == "refused" and verdict.channel in open_:
             for variant, engine in dict.fromkeys(verdict.sides):
-                apart = Inapplicable(
-                    case.case.case, variant, engine, verdict.channel, verdict.reason, "not determined"
-                )
-                found |= {apart: None} if engine != REFERENCE else {}
+                apart = Inapplicable(case.case.case, variant, engine, verdict.channel, verdict.reason, "not determined")
+                absences |= {apart: None} if engine != REFERENCE else {}
             continue
         refusing = _refusing(case, verdict)
         if verdict.ok or not refusing or any(result.engine not in joined for result in refusing):
             counting.append(verdict)
         else:
-            found |= {_inapplicable(case, result, verdict.channel): None for result in refusing}
+            absences |= {_inapplicable(case, result, verdict.channel): None for result in refusing}
     energies = tuple(_energies_left_out(case, joined))
-    return counting, (*(each for each in found if not any(_includes(each, energy) for energy in energies)), *energies)
+    return counting, (
+        *(pattern for pattern in absences if not any(_includes(pattern, energy) for energy in energies)),
+        *energies,
+    )
 
 
 def _includes(pattern: Inapplicable, one: Inapplicable) -> bool:

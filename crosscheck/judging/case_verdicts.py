@@ -63,7 +63,7 @@ def _comparison(case: CaseResults, item: Comparison) -> Iterator[Verdict]:
 
 def _with_surrogates(finding: Finding, *results: Result) -> Finding:
     """A difference names what an engine has another model of, as soft constraints: no effort takes that away."""
-    models = [f"{each.engine}: {each.finest.support}" for each in results if each.finest.support]
+    models = [f"{result.engine}: {result.finest.support}" for result in results if result.finest.support]
     if finding.status != "differ" or not models:
         return finding
     return replace(finding, reason="; ".join((finding.reason, *models)))
@@ -184,12 +184,14 @@ def _channels(
 
 def _without(pattern: str, goals: Iterable[str], *results: Result) -> str:
     """Who has no channel of that name."""
-    lacking = [each.engine for each in results if not any(_belongs(name, pattern, goals) for name in each.channels)]
+    lacking = [
+        result.engine for result in results if not any(_belongs(name, pattern, goals) for name in result.channels)
+    ]
     if len(lacking) == 1:
         return f'{lacking[0]} has no channel "{pattern}"'
     if lacking:
         return f'neither {" nor ".join(lacking)} has a channel "{pattern}"'
-    return f'{" and ".join(each.engine for each in results)} share no channel "{pattern}"'
+    return f'{" and ".join(result.engine for result in results)} share no channel "{pattern}"'
 
 
 def _belongs(channel: str, pattern: str, goals: Iterable[str]) -> bool:
@@ -203,7 +205,9 @@ def _missing(*results: Result) -> Finding | None:
     if not endings:
         return None
     worst = min(endings, key=lambda ending: SEVERITY.index(ending.status))
-    return Finding(worst.status, worst.reason, endings=tuple(each for each in endings if each.status == worst.status))
+    return Finding(
+        worst.status, worst.reason, endings=tuple(ending for ending in endings if ending.status == worst.status)
+    )
 
 
 def _elsewhere(a: Result, b: Result) -> Finding | None:
@@ -244,10 +248,10 @@ def outside(item: Comparison | Conservation, channel: str, finding: Finding) -> 
             return _beyond("U", finding.U, _band(item, channel))
         case "diverged":
             times = [ending.reached_s for ending in finding.endings if ending.status == "diverged"]
-            found = [_beyond("the time reached (s)", time, item.diverged_s) for time in times or [None]]
-            return next(filter(None, found), "")
+            reasons = [_beyond("the time reached (s)", time, item.diverged_s) for time in times or [None]]
+            return next(filter(None, reasons), "")
         case "failed" | "refused":
-            return _unlike(item.because, [each.reason for each in finding.endings] or [finding.reason])
+            return _unlike(item.because, [ending.reason for ending in finding.endings] or [finding.reason])
     return ""
 
 

@@ -86,7 +86,7 @@ class SessionOutcome:
     @property
     def idle(self) -> list[str]:
         """Cases without a verdict and without anything inapplicable: no engine asked for takes part in them."""
-        explained = {each.case for each in self.inapplicable}
+        explained = {absence.case for absence in self.inapplicable}
         return [case for case, group in self.verdicts.items() if not group and case not in explained]
 
     @property
@@ -99,27 +99,27 @@ class SessionOutcome:
     def never_applicable(self) -> dict[str, list[str]]:
         """For each engine the cases of which it can represent nothing."""
         judged = {(verdict.case, engine) for verdict in self.all for _, engine in verdict.sides}
-        found: dict[str, dict[str, None]] = {}
-        for each in self.inapplicable:
-            if each.lies_with_engine and (each.case, each.engine) not in judged:
-                found.setdefault(each.engine, {})[each.case] = None
-        return {engine: list(cases) for engine, cases in found.items()}
+        engines_of: dict[str, dict[str, None]] = {}
+        for absence in self.inapplicable:
+            if absence.lies_with_engine and (absence.case, absence.engine) not in judged:
+                engines_of.setdefault(absence.engine, {})[absence.case] = None
+        return {engine: list(cases) for engine, cases in engines_of.items()}
 
     @property
     def not_offered(self) -> dict[str, int]:
         """For each engine the number of channels that would be judged and that it does not offer."""
-        return dict(Counter(each.engine for each in self.inapplicable if each.kind == "not offered"))
+        return dict(Counter(absence.engine for absence in self.inapplicable if absence.kind == "not offered"))
 
     @property
     def undetermined(self) -> int:
         """The number of channels, by case and variant, that would be judged and that the motion does not determine."""
-        open_ = (each for each in self.inapplicable if each.kind == "not determined")
-        return len({(each.case, each.variant, each.channel) for each in open_})
+        open_ = (absence for absence in self.inapplicable if absence.kind == "not determined")
+        return len({(absence.case, absence.variant, absence.channel) for absence in open_})
 
     @property
     def unaccounted(self) -> list[Unjudged]:
         """Channels that are offered and judged by nothing, and may not be."""
-        return [each for each in self.unjudged if not each.excused]
+        return [channel for channel in self.unjudged if not channel.excused]
 
     @property
     def loosened(self) -> list[Verdict]:
@@ -149,7 +149,9 @@ class SessionOutcome:
     @property
     def unrecorded(self) -> list[Verdict]:
         """Verdicts as expected between the library's own engines, for which no figures were accepted yet."""
-        return [each for each in self.all if each.ok and each.accepted is None and recordable(each, BUILT_IN)]
+        return [
+            verdict for verdict in self.all if verdict.ok and verdict.accepted is None and recordable(verdict, BUILT_IN)
+        ]
 
     @kept
     def lost(self) -> list[Absence]:
@@ -159,11 +161,11 @@ class SessionOutcome:
         """
         judged = {(verdict.case, *side) for verdict in self.all for side in verdict.sides}
         return [
-            each
-            for each in self.absences
-            if each.status == "did not run"
-            or (each.status in FAULTS and (each.case, each.variant, each.engine) not in judged)
-            or (each.status in FAULTS and each.role == ENVELOPE)
+            absence
+            for absence in self.absences
+            if absence.status == "did not run"
+            or (absence.status in FAULTS and (absence.case, absence.variant, absence.engine) not in judged)
+            or (absence.status in FAULTS and absence.role == ENVELOPE)
         ]
 
     @property
@@ -257,11 +259,11 @@ def conclude(session: Session, strict: bool = False) -> SessionOutcome:
         inapplicable += apart
         left += unjudged(case, verdicts[case.case.case], apart)
         lost_controls += tuple(_lost_controls(case, verdicts[case.case.case]))
-    whole = {(each.case, each.variant, each.engine) for each in inapplicable if each.kind == "refused"}
+    whole = {(absence.case, absence.variant, absence.engine) for absence in inapplicable if absence.kind == "refused"}
     absences = [absence for case in session.cases for absence in _absences(case)]
     return SessionOutcome(
         verdicts=verdicts,
-        absences=[each for each in absences if (each.case, each.variant, each.engine) not in whole],
+        absences=[absence for absence in absences if (absence.case, absence.variant, absence.engine) not in whole],
         broken=tuple(str(line) for line in session.broken),
         strict=strict,
         inapplicable=inapplicable,
@@ -271,7 +273,9 @@ def conclude(session: Session, strict: bool = False) -> SessionOutcome:
         idle_claims=idle_claims(session.cases, verdicts, inapplicable),
         unjudged=left,
         lost_controls=lost_controls,
-        contracts={name: state for each in session.environments for name, state in each.contracts.items()},
+        contracts={
+            name: state for environment in session.environments for name, state in environment.contracts.items()
+        },
     )
 
 
@@ -281,7 +285,7 @@ def _lost_controls(case: CaseResults, verdicts: Iterable[Verdict]) -> Iterator[L
     for item in case.case.run.controls:
         faulty = case.get(item.a.variant, item.a.engine, f"control:{item.name}")
         sides = faulty, case.get(item.a.variant, item.a.engine), case.get(item.b.variant, item.b.engine)
-        if item.name not in judged and not any(each.status == "refused" for each in sides):
+        if item.name not in judged and not any(side.status == "refused" for side in sides):
             yield LostControl(case.case.case, item.name, tuple(item.goals))
 
 
@@ -320,17 +324,17 @@ def idle_claims(
     for case in cases:
         claims = case.case.claims
         named: list[tuple[ClaimedGoals | ClaimedFailure, str]]
-        named = [(each, pattern) for each in claims.goals for pattern in each.goals]
-        named += [(each, pattern) for each in claims.failures for pattern in each.channels]
+        named = [(goal, pattern) for goal in claims.goals for pattern in goal.goals]
+        named += [(failure, pattern) for failure in claims.failures for pattern in failure.channels]
         for each, pattern in named:
             if each.whole:
                 places.setdefault((each.place, each.engine, pattern), []).append(case)
     found = []
     for (place, engine, pattern), group in places.items():
         names = {case.case.case for case in group}
-        judged = [each for name in names for each in verdicts[name] if _judges(each, engine)]
-        known = {each.channel for each in judged}
-        known |= {each.channel for each in apart if each.case in names and each.engine == engine}
+        judged = [verdict for name in names for verdict in verdicts[name] if _judges(verdict, engine)]
+        known = {verdict.channel for verdict in judged}
+        known |= {verdict.channel for verdict in apart if verdict.case in names and verdict.engine == engine}
         certain = judged and all(_finished(case, engine) for case in group)
         if certain and not any(matches(pattern, channel) for channel in known):
             found.append(f'{place}: "{pattern}" names no channel of {engine} that is judged: correct it')

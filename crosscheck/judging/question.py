@@ -38,21 +38,21 @@ class Question:
         """The goal of a channel, with the reason if it is claimed. A goal of 0 stands for a channel that has none."""
         if self.kind == "control" or goal == 0.0:
             return goal, ""
-        found = []
+        claims = []
         for engine in dict.fromkeys((self.a.engine, self.b.engine)):
             goals = self.case.claims.goals_of(engine)
             pattern = most_specific(goals, channel)
             if pattern is not None:
                 claimed, reason = goals[pattern]
-                found.append((claimed, f"{engine}: {reason}"))
-        return max(found, default=(goal, ""))
+                claims.append((claimed, f"{engine}: {reason}"))
+        return max(claims, default=(goal, ""))
 
     def _own_failure(self, channel: str) -> ClaimedFailure | None:
         """The user's expectation of a failure where the case expects agreement; of several the last counts."""
         if self.kind == "control" or self.expected != "agree":
             return None
-        mine = [each for each in self.case.claims.failures if each.engine in (self.a.engine, self.b.engine)]
-        found = [each for each in mine if most_specific(each.channels, channel) is not None]
+        mine = [failure for failure in self.case.claims.failures if failure.engine in (self.a.engine, self.b.engine)]
+        found = [comparison for comparison in mine if most_specific(comparison.channels, channel) is not None]
         return found[-1] if found else None
 
     def verdict(self, channel: str, goal: float, finding: Finding, beyond: str = "", advice: str = "") -> Verdict:

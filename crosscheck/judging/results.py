@@ -191,8 +191,8 @@ class CaseResults:
         """Channels that the motion of any of these variants does not determine: the values of an engine are one choice
         of infinitely many. They were found from the scenes; what engines say changes nothing here."""
         infos = [self.case.variants[name] for name in variants if name in self.case.variants]
-        found = [each.undetermined for each in infos if not isinstance(each.undetermined, msgspec.UnsetType)]
-        return tuple(dict.fromkeys(channel for each in found for channel in each))
+        found = [info.undetermined for info in infos if not isinstance(info.undetermined, msgspec.UnsetType)]
+        return tuple(dict.fromkeys(channel for channels in found for channel in channels))
 
 
 @dataclass(frozen=True)

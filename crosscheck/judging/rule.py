@@ -60,8 +60,8 @@ def _numbers() -> Iterator[str]:
             RungSignal(effort, _signal(times, error), count)
             for effort, error, count in zip(efforts, errors, evaluations, strict=True)
         ]
-        found = estimate(CHANNEL, kind, rungs, 1.7)
-        yield f"{found.value:.4g} {found.envelope[9]:.4g}"
+        estimated = estimate(CHANNEL, kind, rungs, 1.7)
+        yield f"{estimated.value:.4g} {estimated.envelope[9]:.4g}"
     for order in (1.0, 4.0):
         fine, coarse = (_signal(times, error) for error in (0.011, 0.083))
         yield f"{spatial(CHANNEL, coarse, fine, 2.0, order)[-1]:.4g}"
@@ -89,9 +89,9 @@ def _judged(times: Real, size: float) -> Iterator[str]:
         doubt = Uncertainty(np.full(len(times), 3.7e-10), 3.7e-10, "")
         one = Signal(values, doubt, sizes.of(name))
         other = Signal(values * (1.0 + 1.3e-10), doubt, sizes.of(name))
-        found = compare(name, one, other, 1.0)
+        verdict = compare(name, one, other, 1.0)
         roundings = " ".join(f"{sizes.magnitude(name, count):.4g}" for count in (0, 10**8))
-        yield f"{found.status} {found.E or 0.0:.4g} {found.U or 0.0:.4g} {roundings}"
+        yield f"{verdict.status} {verdict.E or 0.0:.4g} {verdict.U or 0.0:.4g} {roundings}"
 
 
 def _signal(times: Real, error: float) -> Real:

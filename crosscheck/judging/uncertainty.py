@@ -148,7 +148,7 @@ def _fault(kind: str, rungs: Sequence[RungSignal], size: float) -> str:
         return "an effort has values that are not numbers"
     evaluations = [rung.evaluations for rung in rungs]
     if not (all(0 <= count < np.inf for count in evaluations) and 0.0 <= size < np.inf):
-        count = next((each for each in evaluations if not 0 <= each < np.inf), evaluations[-1])
+        count = next((evaluation for evaluation in evaluations if not 0 <= evaluation < np.inf), evaluations[-1])
         return f"{count} evaluations of a signal of size {size:g} leave no round-off to be told"
     return ""
 
@@ -180,8 +180,8 @@ def spatial(channel: str, coarse: Real, fine: Real, ratio: float, order: float) 
         return np.full(samples, np.inf)
     with np.errstate(all="ignore"):
         left = -np.expm1(-order * np.log(ratio))  # 1 - r^-p cannot overflow
-        found = np.maximum.accumulate(SAFETY / left * distance(channel, coarse, fine))
-    return found if np.all(np.isfinite(found)) else np.full(samples, np.inf)
+        bound = np.maximum.accumulate(SAFETY / left * distance(channel, coarse, fine))
+    return bound if np.all(np.isfinite(bound)) else np.full(samples, np.inf)
 
 
 def observed_order(steps: Sequence[float], wider: float, gap: float) -> float | None:

@@ -73,12 +73,14 @@ class UnjudgedChannels:
 
 def grouped(left: Iterable[Unjudged]) -> list[UnjudgedChannels]:
     """Unjudged channels by case, variant, engine and reason, what is not excused first."""
-    found: dict[tuple[str, str, str, str, bool], list[str]] = {}
-    for each in left:
-        found.setdefault((each.case, each.variant, each.engine, each.reason, each.excused), []).append(each.channel)
+    channels_of: dict[tuple[str, str, str, str, bool], list[str]] = {}
+    for channel in left:
+        channels_of.setdefault(
+            (channel.case, channel.variant, channel.engine, channel.reason, channel.excused), []
+        ).append(channel.channel)
     groups = [
         UnjudgedChannels(case, variant, engine, tuple(channels), reason, excused)
-        for (case, variant, engine, reason, excused), channels in found.items()
+        for (case, variant, engine, reason, excused), channels in channels_of.items()
     ]
     return sorted(groups, key=lambda group: group.excused)
 
@@ -95,7 +97,7 @@ def unjudged(
         for side in verdict.sides
     }
     told |= set(_by_drift(case, verdicts))
-    told |= {(each.variant, each.engine, each.channel) for each in inapplicable}
+    told |= {(absence.variant, absence.engine, absence.channel) for absence in inapplicable}
     results = [case.get(variant.name, engine) for variant in case.case.run.variants for engine in variant.engines]
     left = _Left(case)
     return tuple(
@@ -108,10 +110,10 @@ def unjudged(
 
 def _by_drift(case: CaseResults, verdicts: Iterable[Verdict]) -> Iterator[tuple[str, str, str]]:
     """Variant, engine and channel of what the drift of a conserved quantity accounts for."""
-    for each in verdicts:
-        if each.kind == "conservation" and each.status in ACCOUNTING and each.channel in TOLD_BY:
-            result, channel = case.get(each.variant_a, each.engine_a), TOLD_BY[each.channel]
-            least = ROUNDING * (each.scale or 0.0)
+    for verdict in verdicts:
+        if verdict.kind == "conservation" and verdict.status in ACCOUNTING and verdict.channel in TOLD_BY:
+            result, channel = case.get(verdict.variant_a, verdict.engine_a), TOLD_BY[verdict.channel]
+            least = ROUNDING * (verdict.scale or 0.0)
             if channel in result.channels and np.all(np.abs(result.values(channel)[:1]) <= least):
                 yield result.variant, result.engine, channel
 
@@ -135,16 +137,16 @@ class _Left:
             said = reason or (UNSAID if record.whole else OPEN)
             return Unjudged(record.case, result.variant, result.engine, channel, said, bool(reason) or not record.whole)
         reason, excused = self._held(result, channel)
-        expected = [each.channels for each in record.claims.failures if each.engine == result.engine]
+        expected = [failure.channels for failure in record.claims.failures if failure.engine == result.engine]
         excused = excused or any(most_specific(patterns, channel) is not None for patterns in expected)
         return Unjudged(record.case, result.variant, result.engine, channel, f"{OPEN}; {reason}", excused)
 
     def _why_open(self, result: Result, channel: str) -> str:
         """The reason that the case gives, also of a run that is expected to agree with nothing; "" if it gives none."""
         run = self.case.case.run
-        for each in run.open:
-            if each.concerns(result.variant, result.engine) and most_specific(each.channels, channel) is not None:
-                return each.reason
+        for opening in run.open:
+            if opening.concerns(result.variant, result.engine) and most_specific(opening.channels, channel) is not None:
+                return opening.reason
         other = expected_otherwise(run, result.variant, result.engine)
         return "" if other is None else f"what is expected of it is {other.expect}, in '{other.name}': {other.reason}"
 
@@ -163,8 +165,12 @@ class _Left:
         pattern = most_specific(claimed, channel)
         if pattern is not None:
             return claimed[pattern][0]
-        about = [each for each in self.case.case.run.comparisons if (result.variant, result.engine) in _sides(each)]
-        return max((goal for each in about for goal in each.goals.values()), default=WHOLE_RANGE)
+        about = [
+            comparison
+            for comparison in self.case.case.run.comparisons
+            if (result.variant, result.engine) in _sides(comparison)
+        ]
+        return max((goal for comparison in about for goal in comparison.goals.values()), default=WHOLE_RANGE)
 
     def _others(self, result: Result, channel: str) -> Iterator[tuple[str, Signal, Signal]]:
         """Those who have the channel, the stored reference first, with the signals of both at the same times."""

@@ -50,8 +50,8 @@ class Basis:
         if self.alone:
             return f"{self.codes[0]} alone ({', '.join(self.formulations)})"
         formulas = ["closed form"] * self.closed_form + [OWN_EQUATIONS] * self.own_equations
-        marks = {each: " (witness)" for each in self.witnesses}
-        return ", ".join(f"{each}{marks.get(each, '')}" for each in (*formulas, *self.codes))
+        marks = {witness: " (witness)" for witness in self.witnesses}
+        return ", ".join(f"{code}{marks.get(code, '')}" for code in (*formulas, *self.codes))
 
 
 def basis(routes: Iterable[str]) -> Basis:
@@ -63,8 +63,8 @@ def basis(routes: Iterable[str]) -> Basis:
         what = how.removesuffix(f", {WITNESS}") if name.endswith(".py") else name.partition("-")[0]
         stands[what] = stands.get(what, False) or equal
         names += [] if name.endswith(".py") else [name]
-    codes = tuple(each for each in stands if each not in (CLOSED_FORM, OWN_EQUATIONS))
-    witnesses = tuple(each for each, equal in stands.items() if not equal)
+    codes = tuple(code for code in stands if code not in (CLOSED_FORM, OWN_EQUATIONS))
+    witnesses = tuple(code for code, equal in stands.items() if not equal)
     return Basis(CLOSED_FORM in stands, OWN_EQUATIONS in stands, codes, tuple(dict.fromkeys(names)), witnesses)
 
 

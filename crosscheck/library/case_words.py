@@ -41,7 +41,7 @@ def meant(word: str, names: Iterable[str], tags: Tags) -> tuple[str, ...]:
     tagged = tags()
     matching = tuple(name for name in names if word == _family(name) or word in tagged[name])
     if not matching:
-        known = {each for name in names for each in (name, _last(name), _family(name), *tagged[name])} | {ALL}
+        known = {word for name in names for word in (name, _last(name), _family(name), *tagged[name])} | {ALL}
         raise CaseError(
             f'"{word}" is no case, no family, no tag and no folder with a run.toml: {closest(word, known)}. '
             "`crosscheck list` shows them all."
@@ -55,19 +55,19 @@ def chosen(words: Iterable[str], one: Callable[[str], Iterable[str]]) -> tuple[s
     CaseError for a `!` that leaves out nothing, as a misspelt word would, and if nothing remains.
     """
     words = tuple(words)
-    found: dict[str, None] = {}
+    cases: dict[str, None] = {}
     for word in words:
         if not word.startswith(NOT):
-            found |= dict.fromkeys(one(word))
+            cases |= dict.fromkeys(one(word))
             continue
-        out = [name for name in one(word.removeprefix(NOT)) if name in found]
+        out = [name for name in one(word.removeprefix(NOT)) if name in cases]
         if not out:
             raise CaseError(f'"{word}" leaves out nothing that the words before it mean: write it behind them')
         for name in out:
-            del found[name]
-    if words and not found:
+            del cases[name]
+    if words and not cases:
         raise CaseError(f"{' '.join(words)}: no case remains")
-    return tuple(found)
+    return tuple(cases)
 
 
 def _family(name: str) -> str:

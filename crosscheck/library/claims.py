@@ -59,19 +59,19 @@ class Claims(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     def of(self, engines: Collection[str]) -> Claims:
         """Those on some engines."""
         return Claims(
-            goals=tuple(each for each in self.goals if each.engine in engines),
-            failures=tuple(each for each in self.failures if each.engine in engines),
-            efforts=tuple(each for each in self.efforts if each.engine in engines),
+            goals=tuple(goal for goal in self.goals if goal.engine in engines),
+            failures=tuple(failure for failure in self.failures if failure.engine in engines),
+            efforts=tuple(effort for effort in self.efforts if effort.engine in engines),
         )
 
     def goals_of(self, engine: str) -> dict[str, tuple[float, str]]:
         """Goal and reason by pattern of channels; of equal patterns the last counts."""
-        mine = (each for each in self.goals if each.engine == engine)
-        return {pattern: (goal, each.reason) for each in mine for pattern, goal in each.goals.items()}
+        mine = (goal for goal in self.goals if goal.engine == engine)
+        return {pattern: (goal, failure.reason) for failure in mine for pattern, goal in failure.goals.items()}
 
     def efforts_of(self, engine: str) -> tuple[float, ...]:
         """All efforts that are written for an engine, from coarse to fine."""
-        found = {value for each in self.efforts if each.engine == engine for value in each.values}
+        found = {value for effort in self.efforts if effort.engine == engine for value in effort.values}
         return tuple(sorted(found, reverse=True))
 
 
@@ -90,9 +90,9 @@ def claims_on(
     """
     claims = {name: Claims() for name in session}
     for source, content in written.items():
-        problems = [str(each) for each in check_expect_file(content, engines)]
+        problems = [str(problem) for problem in check_expect_file(content, engines)]
         if problems:
-            raise CaseError("\n".join(f"{source}: {each}" for each in problems))
+            raise CaseError("\n".join(f"{source}: {problem}" for problem in problems))
         for place, entry in _entries(content):
             where = f"{source}: {place}"
             called = _called(entry.cases, names, tags, f"{source}: {place.key('cases')}")
@@ -122,9 +122,7 @@ def _with(claims: Claims, entry: GoalEntry | FailureEntry | EffortsEntry, place:
     """The claims with one more."""
     match entry:
         case GoalEntry():
-            goals = ClaimedGoals(
-                engine=entry.engine, place=place, whole=whole, goals=entry.goals, reason=entry.reason
-            )
+            goals = ClaimedGoals(engine=entry.engine, place=place, whole=whole, goals=entry.goals, reason=entry.reason)
             return msgspec.structs.replace(claims, goals=(*claims.goals, goals))
         case FailureEntry():
             failure = ClaimedFailure(

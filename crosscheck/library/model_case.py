@@ -57,13 +57,13 @@ def write_case(scene: Scene, folder: Path, engines: tuple[str, str], t_end: floa
 def with_markers(scene: Scene) -> Scene:
     """The scene with a marker at the frame of every body that can move and has none there, named after the body."""
     still = _still(scene)
-    there = {(each.body, each.node) for each in scene.markers if not any(each.offset_m)}
-    taken = {each.name for each in scene.markers}
+    there = {(marker.body, marker.node) for marker in scene.markers if not any(marker.offset_m)}
+    taken = {marker.name for marker in scene.markers}
     added = list[Marker]()
     for body in scene.bodies:
         node = _frame(body)
         if node and body.name not in still and (body.name, node) not in there:
-            name = next(each for each in _names(body.name) if each not in taken)
+            name = next(name for name in _names(body.name) if name not in taken)
             taken.add(name)
             added.append(Marker(name=name, body=body.name, node=node))
     return replace(scene, markers=(*scene.markers, *added))

@@ -32,12 +32,12 @@ def fault(pattern: str) -> str:
     if named:
         parts = _matching(PARTS, kind)
         if not parts:
-            return f'there is no kind "{kind}:"; it is one of {", ".join(f"{each}:" for each in PARTS)}'
+            return f'there is no kind "{kind}:"; it is one of {", ".join(f"{part}:" for part in PARTS)}'
         name, dot, part = rest.rpartition(".")
         if not (name if dot else rest):
             return f"it names no {kind}"
-        known = [each for group in parts for each in group]
-        if dot and known and not any(fnmatchcase(each, part) for each in known):
+        known = [kind for group in parts for kind in group]
+        if dot and known and not any(fnmatchcase(kind, part) for kind in known):
             return f'there is no "{part}" of a {kind}; it is one of {", ".join(known)}'
         return ""
     kind, dotted, part = pattern.partition(".")
@@ -45,10 +45,10 @@ def fault(pattern: str) -> str:
         known = [*PARTS, *WHOLE]
         return "" if any(fnmatchcase(each, kind) for each in known) else f"it is none of {', '.join(known)}"
     parts = _matching(WHOLE, kind)
-    known = [each for group in parts for each in group]
-    if any(fnmatchcase(each, part) for each in known):
+    known = [kind for group in parts for kind in group]
+    if any(fnmatchcase(kind, part) for kind in known):
         return ""
-    whole = ", ".join(f"{each}.{part}" for each, group in WHOLE.items() for part in group)
+    whole = ", ".join(f"{kind}.{part}" for kind, group in WHOLE.items() for part in group)
     return f"channels with a dot alone are {whole}"
 
 

@@ -95,17 +95,24 @@ def scene_digest(case: Case, variant: Variant) -> str:
     try:
         scene = json.dumps(parse_toml(_text(case.folder / variant.scene)), sort_keys=True, default=str)
         model = msgspec.structs.replace(
-            variant, engines=(), also=(), efforts=(), refined=None, duration_s=None, samples=None, linear=msgspec.UNSET,
+            variant,
+            engines=(),
+            also=(),
+            efforts=(),
+            refined=None,
+            duration_s=None,
+            samples=None,
+            linear=msgspec.UNSET,
             note="",
         )
-        found = hashlib.sha256(scene.encode() + msgspec.json.encode(model))
+        digest = hashlib.sha256(scene.encode() + msgspec.json.encode(model))
         for body in case.scene(variant).bodies:
             file = getattr(body, "file", None)
             if file is not None:
-                found.update(Path(file).read_bytes())
+                digest.update(Path(file).read_bytes())
     except (Unreadable, OSError, SceneError) as error:
         raise CaseError(f"{case.folder / variant.scene}: {error}") from None
-    return found.hexdigest()
+    return digest.hexdigest()
 
 
 def current_reference(case: Case) -> StoredReference:

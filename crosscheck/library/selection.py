@@ -38,7 +38,7 @@ def select(run: RunFile, asked: tuple[str, ...]) -> RunFile:
     needed = {(side.variant, side.engine) for pair in pairs for side in pair.sides}
     needed |= {(item.variant, engine) for item in conservations for engine in item.engines}
     needed |= {(v.name, engine) for v in run.variants for engine in _all(v) if engine in asked or not asked}
-    variants = tuple(variant for each in run.variants if (variant := _keep(each, needed)).engines)
+    variants = tuple(variant for candidate in run.variants if (variant := _keep(candidate, needed)).engines)
     return msgspec.structs.replace(
         run,
         variants=variants,
@@ -63,7 +63,7 @@ def alone(run: RunFile, asked: tuple[str, ...]) -> RunFile:
     conserved = (_narrowed(run, item, kept, foreign) for item in run.conservations if item.variant == of and kept)
     return msgspec.structs.replace(
         run,
-        variants=tuple(variant for each in run.variants if (variant := _keep(each, needed)).engines),
+        variants=tuple(variant for candidate in run.variants if (variant := _keep(candidate, needed)).engines),
         comparisons=(),
         controls=(),
         conservations=tuple(item for item in conserved if item is not None),
@@ -90,7 +90,7 @@ def goals_for_reference(run: RunFile, engines: Iterable[str]) -> dict[str, tuple
     engines = tuple(engines)
     foreign = joining(run, engines)
     run = _joined(run, engines)
-    pairs = [pair for each in run.comparisons for pair in _pairs(run, each, foreign)]
+    pairs = [pair for comparison in run.comparisons for pair in _pairs(run, comparison, foreign)]
     pairs = [pair for pair in pairs if all(side.variant == recipe.variant for side in pair.sides)]
     named = {side.engine for pair in pairs for side in pair.sides}
     pairs = [pair for pair in pairs if pair.expect == "agree"]
@@ -118,10 +118,10 @@ def expected_otherwise(run: RunFile, variant: str, engine: str) -> Comparison | 
     `run` is a reduced run file.
     """
     about = [
-        each for each in run.comparisons
-        if (variant, engine) in ((side.variant, side.engine) for side in each.sides)
+        comparison for comparison in run.comparisons
+        if (variant, engine) in ((side.variant, side.engine) for side in comparison.sides)
     ]  # fmt: skip
-    return about[0] if about and all(each.expect != "agree" for each in about) else None
+    return about[0] if about and all(comparison.expect != "agree" for comparison in about) else None
 
 
 def without_part(runs: Iterable[RunFile], asked: tuple[str, ...]) -> str:
@@ -138,7 +138,11 @@ def without_part(runs: Iterable[RunFile], asked: tuple[str, ...]) -> str:
 def _joined(run: RunFile, asked: tuple[str, ...]) -> RunFile:
     """The run file with unknown engines added to the variants whose engines are compared with each other."""
     foreign = joining(run, asked)
-    open_to_all = {each.variant for each in run.comparisons if each.variant and (not each.engines or _admits(each))}
+    open_to_all = {
+        comparison.variant
+        for comparison in run.comparisons
+        if comparison.variant and (not comparison.engines or _admits(comparison))
+    }
     open_to_all |= {run.reference.variant} if run.reference is not None else set()
     variants = tuple(
         msgspec.structs.replace(variant, engines=variant.engines + foreign) if variant.name in open_to_all else variant
@@ -157,11 +161,11 @@ def _pairs(run: RunFile, comparison: Comparison, foreign: tuple[str, ...]) -> li
     if comparison.variant is None:
         return [comparison]
     engines = comparison.engines or run.variant(comparison.variant).engines
-    pairs = [_pair(comparison, *each) for each in combinations(engines, 2)]
+    pairs = [_pair(comparison, *combination) for combination in combinations(engines, 2)]
     if foreign and _admits(comparison):
         left = _not_open(run, comparison)
         among = (*product(engines, foreign), *combinations(foreign, 2)) if left.goals else ()
-        pairs += [_pair(left, *each) for each in among]
+        pairs += [_pair(left, *engine_pair) for engine_pair in among]
     return pairs
 
 
@@ -180,10 +184,10 @@ def _pair(comparison: Comparison, first: str, second: str) -> Comparison:
 def _not_open(run: RunFile, comparison: Comparison) -> Comparison:
     """The comparison with those of its goals and scales that no comparison of all engines of the variant includes."""
     of_all = [
-        each for each in run.comparisons
-        if each.variant == comparison.variant and not each.engines and each.expect == "agree"
+        candidate for candidate in run.comparisons
+        if candidate.variant == comparison.variant and not candidate.engines and candidate.expect == "agree"
     ]  # fmt: skip
-    included = [pattern for each in of_all for pattern in each.goals]
+    included = [pattern for comparison in of_all for pattern in comparison.goals]
     goals = {
         pattern: goal
         for pattern, goal in comparison.goals.items()
@@ -213,7 +217,7 @@ def _narrowed(
     """A conserved quantity of the engines asked for; `run` has the `foreign` ones in the variants that they join."""
     engines = run.variant(item.variant).engines
     if item.engines:
-        engines = (*item.engines, *(each for each in foreign if each in engines and item.expect == "agree"))
+        engines = (*item.engines, *(engine for engine in foreign if engine in engines and item.expect == "agree"))
     kept = tuple(engine for engine in engines if not asked or engine in asked)
     return msgspec.structs.replace(item, engines=kept) if kept else None
 

@@ -76,14 +76,14 @@ def _multiplied(function: Function, keys: dict[type, tuple[str, ...]], factor: f
 
 
 def _times(value: float | tuple[float, ...], factor: float) -> float | tuple[float, ...]:
-    return tuple(factor * each for each in value) if isinstance(value, tuple) else factor * value
+    return tuple(factor * component for component in value) if isinstance(value, tuple) else factor * value
 
 
 def in_functions(item: Any, change: Callable[[Function], Function]) -> Any:
     if isinstance(item, Function):
         return change(item)
     if isinstance(item, tuple):
-        return tuple(in_functions(each, change) for each in item) if item and _holds_structs(item) else item
+        return tuple(in_functions(element, change) for element in item) if item and _holds_structs(item) else item
     if not isinstance(item, msgspec.Struct):
         return item
     return msgspec.structs.replace(

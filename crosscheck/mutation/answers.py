@@ -84,7 +84,7 @@ def _by_hinges(scene: Scene) -> list[tuple[str, str]]:
 
 
 def _by_connectors(scene: Scene) -> list[tuple[str, str]]:
-    return [(each.name, each.body_b) for each in scene.connectors if isinstance(each, BetweenNodes)]
+    return [(connector.name, connector.body_b) for connector in scene.connectors if isinstance(connector, BetweenNodes)]
 
 
 def _on_paths(change: Callable[[MarkerPath], MarkerPath]) -> Falsify:
@@ -124,8 +124,8 @@ def _wheels_left_out(run: Trajectory, scene: Scene) -> Trajectory:
     momentum = run.momentum.copy()
     bodies = {body.name: body for body in scene.bodies}
     for wheel in scene.wheels:
-        path = next((run.markers[each.name] for each in scene.markers if each.body == wheel.body), None)
-        marker = next((each for each in scene.markers if each.body == wheel.body), None)
+        path = next((run.markers[marker.name] for marker in scene.markers if marker.body == wheel.body), None)
+        marker = next((marker for marker in scene.markers if marker.body == wheel.body), None)
         if path is None or marker is None:
             continue
         frames = rest_frames(bodies[wheel.body])
@@ -259,25 +259,25 @@ FAULTS = (
         "derivative_transposed",
         "derivatives transposed",
         "columns for rows",
-        _matrices(lambda each: each.transpose(0, 2, 1)),
+        _matrices(lambda M: M.transpose(0, 2, 1)),
     ),
     AnswerFault(
         "derivative_order",
         "derivatives with coordinates in reverse order",
         "another order of the coordinates",
-        _matrices(lambda each: each[:, ::-1, ::-1]),
+        _matrices(lambda M: M[:, ::-1, ::-1]),
     ),
     AnswerFault(
         "derivative_of_position",
         "no derivatives by displacements",
         "gravity and stiffness taken for constant",
-        _matrices(lambda each: 0.0 * each, "by_displacement"),
+        _matrices(lambda M: 0.0 * M, "by_displacement"),
     ),
     AnswerFault(
         "derivative_of_speed",
         "derivatives by speeds negated",
         "Coriolis and damping terms moved to the other side",
-        _matrices(lambda each: -each, "by_speed"),
+        _matrices(lambda M: -M, "by_speed"),
     ),
     AnswerFault("frequency_unit", "frequencies in Hz", "Hz for rad/s", _in_hertz),
     AnswerFault("late", "every sample is the one before it", "state before the step for that after it", _late),

@@ -33,15 +33,15 @@ class ByReference:
 
     @kept
     def trusted(self) -> frozenset[str]:
-        found = hold(self.true, self.reference, self.asked)
-        return frozenset(name for name, _, finding in found if finding.status == "agree")
+        verdicts = hold(self.true, self.reference, self.asked)
+        return frozenset(name for name, _, finding in verdicts if finding.status == "agree")
 
     def of_scene(self, faulty: Result) -> dict[str, ShownIn]:
         """The findings on the run of a faulty scene by channel, or by pattern if it did not finish."""
-        found = hold(faulty, self.reference, self.asked, like=self.true)
+        verdicts = hold(faulty, self.reference, self.asked, like=self.true)
         return {
             name: ShownIn(status=finding.status, E=finding.E, U=finding.U, goal=goal)
-            for name, goal, finding in found
+            for name, goal, finding in verdicts
             if name in self.trusted or (self.trusted and faulty.status != "finished")
         }
 
@@ -72,5 +72,5 @@ def by_reference(what: JudgedVariant, true: Result) -> ByReference | str:
         return f"the stored reference cannot be used: {recorded.fault}"
     if true.status != "finished":
         return f"there is no true run: {true.message}"
-    found = ByReference(true, of_record(recorded), recorded.asked[what.engine])
-    return found if found.trusted else "the engine's true run agrees with the stored reference in no channel"
+    references = ByReference(true, of_record(recorded), recorded.asked[what.engine])
+    return references if references.trusted else "the engine's true run agrees with the stored reference in no channel"

@@ -69,13 +69,13 @@ def run_campaign(
     CaseError where a case judges nothing that the engine runs.
     """
     subjects = [subject(case, engine) for case in cases]
-    faulty = [mutants_of(each, all_targets) for each in subjects]
-    plans = [_plan(each.case, provider, limits) for each in faulty]
+    faulty = [mutants_of(subject, all_targets) for subject in subjects]
+    plans = [_plan(case.case, provider, limits) for case in faulty]
     take_away(out / SCORES)  # so that a killed campaign leaves none of an earlier one
     run_planned(plans, (engine,), out / RECORDS, fresh=fresh, limits=limits, listener=listener)
-    found = {each.case.case: each for each in collect(last_session(read(out / RECORDS))).cases}
+    found = {case.case.case: case for case in collect(last_session(read(out / RECORDS))).cases}
     scores = tuple(scored(one, mutants, found[one.case.name]) for one, mutants in zip(subjects, faulty, strict=True))
-    ordered = tuple(sorted(scores, key=lambda each: each.case))
+    ordered = tuple(sorted(scores, key=lambda score: score.case))
     text = msgspec.json.format(msgspec.json.encode(MutationFile(cases=ordered)), indent=1)
     write_whole(out / SCORES, text + b"\n")
     return scores
@@ -98,16 +98,17 @@ def scored(what: JudgedVariant, mutants: CaseMutants, results: CaseResults) -> M
         verdicts[verdict.comparison].append(verdict)
     true = results.get(what.variant.name, what.engine)
     patient = true.status == "finished" and PATIENCE * true.finest.wall_s <= MUTANT_LIMIT_S
-    found = by_reference(what, true)
-    stored, no_reference = (None, found) if isinstance(found, str) else (found, "")
+    references = by_reference(what, true)
+    stored, no_reference = (None, references) if isinstance(references, str) else (references, "")
     of_scene = []
     for name, control in mutants.mutants.items():
         faulty = results.get(what.variant.name, what.engine, f"control:{name}")
         reference = stored.of_scene(faulty) if stored is not None else {}
         channels = {
-            each.channel: ShownIn(status=each.status, E=each.E, U=each.U, goal=each.goal) for each in verdicts[name]
+            verdict.channel: ShownIn(status=verdict.status, E=verdict.E, U=verdict.U, goal=verdict.goal)
+            for verdict in verdicts[name]
         }
-        worst = max(verdicts[name], key=lambda each: each.E or 0.0, default=None)
+        worst = max(verdicts[name], key=lambda verdict: verdict.E or 0.0, default=None)
         reason = "no verdict" if worst is None else worst.reason
         of_scene.append(_mutant("scene", control.mutation, control.target, reason, channels, reference, patient))
     of_answer, not_asked = _answers(what, true, stored)
@@ -142,10 +143,10 @@ def _mutant(
 
 def _answers(what: JudgedVariant, true: Result, stored: ByReference | None) -> tuple[list[Mutant], list[PassedOver]]:
     """Faults planted in the true run; those that change nothing, or nothing that the case judges, are passed over."""
-    found: list[Mutant] = []
+    mutants: list[Mutant] = []
     passed: list[PassedOver] = []
     if true.status != "finished":
-        return found, [PassedOver(mutation="answers", target="", reason=f"no true run: {true.message}")]
+        return mutants, [PassedOver(mutation="answers", target="", reason=f"no true run: {true.message}")]
     scene = variant_scene(what.case.scene(what.variant), what.variant)
     rounding = _rounding(true)
     for fault in FAULTS:
@@ -160,8 +161,8 @@ def _answers(what: JudgedVariant, true: Result, stored: ByReference | None) -> t
             reference = stored.of_answer(wrong) if stored is not None else {}
             worst = max(channels, key=lambda name: channels[name].E or 0.0)
             reason = f"{fault.what}: {worst}"
-            found.append(_mutant("answer", fault.name, "", reason, channels, reference))
-    return found, passed
+            mutants.append(_mutant("answer", fault.name, "", reason, channels, reference))
+    return mutants, passed
 
 
 def _rounding(true: Result) -> dict[str, float]:

@@ -99,11 +99,13 @@ def run_invariances(
     CaseError where a case judges nothing that the engine runs.
     """
     sets = [_planned(subject(case, engine), provider, limits) for case in cases]
-    plans = [(each.record, each.jobs) for each in sets]
+    plans = [(invariance.record, invariance.jobs) for invariance in sets]
     take_away(out / VERDICTS)  # so that a killed session leaves none of an earlier one
     run_planned(plans, (engine,), out / RECORDS, fresh=fresh, limits=limits, listener=listener)
-    found = {each.case.case: each for each in collect(last_session(read(out / RECORDS))).cases}
-    verdicts = tuple(verdict for each in sets for verdict in _judged(each, found[each.what.case.name]))
+    found = {case.case.case: case for case in collect(last_session(read(out / RECORDS))).cases}
+    verdicts = tuple(
+        verdict for invariance in sets for verdict in _judged(invariance, found[invariance.what.case.name])
+    )
     text = msgspec.json.format(msgspec.json.encode(InvarianceFile(verdicts=verdicts)), indent=1)
     write_whole(out / VERDICTS, text + b"\n")
     return verdicts
@@ -262,8 +264,8 @@ def _verdict(head: InvarianceVerdict, findings: dict[str, Finding]) -> Invarianc
         return msgspec.structs.replace(head, status="did not run", reason="no channel could be compared")
 
     def excess(name: str) -> tuple[bool, float]:
-        found = findings[name]
-        return found.status not in ("agree", "unresolved"), (found.E or 0.0) / (found.U or np.inf)
+        finding = findings[name]
+        return finding.status not in ("agree", "unresolved"), (finding.E or 0.0) / (finding.U or np.inf)
 
     worst = max(findings, key=excess)
     unjudged = [name for name, found in findings.items() if found.status == "unresolved"]

@@ -113,7 +113,7 @@ def same_to_rounding(one: Any, other: Any) -> bool:
         return type(one) is type(other) and all(same_to_rounding(getattr(one, k), getattr(other, k)) for k in keys)
     if not (isinstance(one, tuple) and isinstance(other, tuple) and len(one) == len(other)):
         return _near(one, other, 0.0)
-    if all(isinstance(each, float) for each in (*one, *other)):
+    if all(isinstance(component, float) for component in (*one, *other)):
         largest = max(map(abs, one), default=0.0)
         return all(_near(a, b, largest) for a, b in zip(one, other, strict=True))
     return all(map(same_to_rounding, one, other))

@@ -71,15 +71,15 @@ class MutationScore(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def counted(self) -> tuple[Mutant, ...]:
-        return tuple(each for each in self.mutants if each.outcome in ("noticed", "missed"))
+        return tuple(mutant for mutant in self.mutants if mutant.outcome in ("noticed", "missed"))
 
     @property
     def missed(self) -> tuple[Mutant, ...]:
-        return tuple(each for each in self.mutants if each.outcome == "missed")
+        return tuple(mutant for mutant in self.mutants if mutant.outcome == "missed")
 
     @property
     def not_judged(self) -> tuple[Mutant, ...]:
-        return tuple(each for each in self.mutants if each.outcome == "not judged")
+        return tuple(mutant for mutant in self.mutants if mutant.outcome == "not judged")
 
 
 def outcome(channels: dict[str, ShownIn], patient: bool = False) -> tuple[Outcome, bool]:
@@ -87,10 +87,11 @@ def outcome(channels: dict[str, ShownIn], patient: bool = False) -> tuple[Outcom
 
     `patient`: the time limit was many times the true run's time, so that an unfinished run counts as noticed.
     """
-    found = {each.status for each in channels.values()}
+    found = {channel.status for channel in channels.values()}
     if "differ" in found:
         beyond = any(
-            each.status == "differ" and each.E is not None and each.goal < each.E for each in channels.values()
+            channel.status == "differ" and channel.E is not None and channel.goal < channel.E
+            for channel in channels.values()
         )
         return "noticed", beyond
     if found == {"diverged"} or (patient and found == {"did not finish"}):
@@ -110,7 +111,7 @@ def mutation_score(
     passed_over: Iterable[PassedOver],
     no_reference: str = "",
 ) -> MutationScore:
-    counted = [each for each in mutants if each.outcome in ("noticed", "missed")]
+    counted = [mutant for mutant in mutants if mutant.outcome in ("noticed", "missed")]
     channels: dict[str, ChannelScore] = {}
     for mutant in counted:
         for name, shown in mutant.channels.items():
@@ -121,9 +122,9 @@ def mutation_score(
         case=case,
         variant=variant,
         engine=engine,
-        score=_share([each.outcome == "noticed" for each in counted]),
-        score_at_goals=_share([each.beyond_goal for each in counted]),
-        score_by_reference=_share([each.by_reference == "noticed" for each in counted if _referred(each)]),
+        score=_share([mutant.outcome == "noticed" for mutant in counted]),
+        score_at_goals=_share([mutant.beyond_goal for mutant in counted]),
+        score_by_reference=_share([mutant.by_reference == "noticed" for mutant in counted if _referred(mutant)]),
         no_reference=no_reference,
         channels=dict(sorted(channels.items())),
         mutants=tuple(mutants),

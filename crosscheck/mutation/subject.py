@@ -33,12 +33,12 @@ def subject(case: Case, engine: str) -> JudgedVariant:
 
     CaseError where there is none. An engine that the case does not name (a user's own) runs the first judged variant.
     """
-    judged = [_variants(each) for each in _agreeing(case)]
+    judged = [_variants(comparison) for comparison in _agreeing(case)]
     names = [name for group in judged for name in group]
     recipe = case.run.reference
     if recipe is not None and recipe.variant in names:
         names.insert(0, recipe.variant)
-    named = {each for variant in case.run.variants for each in (*variant.engines, *variant.also)}
+    named = {engine for variant in case.run.variants for engine in (*variant.engines, *variant.also)}
     for name in dict.fromkeys(names):
         variant = case.run.variant(name)
         goals, scales = _asked(case, name, engine)
@@ -56,7 +56,9 @@ def reduced(what: JudgedVariant) -> Case:
 
 def _agreeing(case: Case) -> list[Comparison]:
     """Comparisons that must agree, or all if there are none."""
-    return [each for each in case.run.comparisons if each.expect == "agree"] or list(case.run.comparisons)
+    return [comparison for comparison in case.run.comparisons if comparison.expect == "agree"] or list(
+        case.run.comparisons
+    )
 
 
 def _variants(comparison: Comparison) -> list[str]:
@@ -78,9 +80,9 @@ def _asked(case: Case, variant: str, engine: str) -> tuple[dict[str, float], dic
     """
     goals: dict[str, float] = {}
     scales: dict[str, float] = {}
-    about = [each for each in case.run.comparisons if variant in _variants(each)]
-    agreeing = [each for each in about if each.expect == "agree"] or about
-    for comparison in [each for each in agreeing if engine in _engines(case, each)] or agreeing:
+    about = [comparison for comparison in case.run.comparisons if variant in _variants(comparison)]
+    agreeing = [comparison for comparison in about if comparison.expect == "agree"] or about
+    for comparison in [candidate for candidate in agreeing if engine in _engines(case, candidate)] or agreeing:
         for pattern, goal in comparison.goals.items():
             goals[pattern] = min(goal, goals.get(pattern, goal))
         scales |= comparison.scales

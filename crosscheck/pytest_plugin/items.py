@@ -142,7 +142,7 @@ class ChannelItem(_CaseItem):
     def setup(self) -> None:
         """Run the engine, if it has not run yet; a missing engine is an error, not a failure."""
         outcome = self.request.runs.outcome(self.case, self.engine)
-        absent = next((each for each in outcome.absences if each.status == "did not run"), None)
+        absent = next((absence for absence in outcome.absences if absence.status == "did not run"), None)
         if absent is not None:
             self.missing(f"{self.engine} did not run: {absent.reason}")
 
@@ -172,7 +172,7 @@ class ChannelItem(_CaseItem):
     def _without_verdict(self) -> None:
         """Skip a channel that is not applicable, with the engine's reason, or an energy that it does not offer."""
         apart = self.request.runs.outcome(self.case, self.engine).inapplicable
-        mine = next((each for each in apart if each.channel in ("", *self.wanted)), None)
+        mine = next((verdict for verdict in apart if verdict.channel in ("", *self.wanted)), None)
         reason = "" if mine is None else mine.reason
         if reason and self.request.strict:
             raise NotAsExpected(f"{self.case.name}, {self.engine}, {self.wanted[0]}: not applicable: {reason}")

@@ -34,8 +34,8 @@ class Request:
     @property
     def tags(self) -> tuple[str, ...]:
         """Tags of the cases, which become marks."""
-        found = dict.fromkeys(tag for case in self.cases for tag in marks_of(case))
-        return tuple(found)
+        tags = dict.fromkeys(tag for case in self.cases for tag in marks_of(case))
+        return tuple(tags)
 
     @property
     def headline(self) -> str:

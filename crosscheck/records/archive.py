@@ -183,8 +183,8 @@ def _set_broken_lines_aside(file: Path, kind: Any) -> None:
                     lost.write(line)
             elif line.endswith(b"\n"):
                 whole.write(line)
-    for each in broken.values():
-        warnings.warn(f"{each}; moved to {aside.name}, and what it held is run again", BrokenRecords, stacklevel=3)
+    for trouble in broken.values():
+        warnings.warn(f"{trouble}; moved to {aside.name}, and what it held is run again", BrokenRecords, stacklevel=3)
 
 
 def _ended(file: Path) -> bool:

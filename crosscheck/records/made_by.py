@@ -45,11 +45,11 @@ def made_by(modules: Iterable[str], recording: Iterable[str] = RECORDING) -> str
 
 @cache
 def _key(modules: frozenset[str], recording: frozenset[str]) -> str:
-    found = sources(modules, recording)
+    files = sources(modules, recording)
     digest = hashlib.sha256()
-    for module, file in sorted(found.files.items()):
+    for module, file in sorted(files.files.items()):
         digest.update(f"{module} {_text(file)}\n".encode())
-    for library in sorted(found.libraries):
+    for library in sorted(files.libraries):
         digest.update(f"{library} {_library(library)}\n".encode())
     digest.update(_machine().encode())
     return digest.hexdigest()[:16]
@@ -66,14 +66,14 @@ def _library(top: str) -> str:
     first = owner(top)
     if first is None:
         return "not installed"
-    found: dict[str, Distribution] = {}
+    distributions: dict[str, Distribution] = {}
     waiting = [first]
     while waiting:
-        each = waiting.pop()
-        if each.name not in found:
-            found[each.name] = each
-            waiting.extend(_required(each))
-    return ", ".join(_content(found[name]) for name in sorted(found))
+        module = waiting.pop()
+        if module.name not in distributions:
+            distributions[module.name] = module
+            waiting.extend(_required(module))
+    return ", ".join(_content(distributions[name]) for name in sorted(distributions))
 
 
 def _required(library: Distribution) -> list[Distribution]:

@@ -24,7 +24,7 @@ def standing(records: Sequence[Record]) -> list[Record]:
             begin, confirms = place, record.confirms
         elif isinstance(record, CaseRecord) and asked.get(record.case, -1) < begin:  # the first of this session
             asked[record.case] = place if confirms else 0
-            confirmed = {each for each in confirmed if each[0] != record.case}
+            confirmed = {key for key in confirmed if key[0] != record.case}
         elif isinstance(record, Confirmed):
             confirmed.add(_work(record))
     return [
@@ -38,9 +38,9 @@ def last_session(records: Sequence[Record]) -> list[Record]:
     """The current records of the last session's cases."""
     begin = max((place for place, record in enumerate(records) if isinstance(record, Environment)), default=0)
     cases = {record.case for record in records[begin:] if isinstance(record, CaseRecord)}
-    found = standing(records)
-    latest = next((record for record in reversed(found) if isinstance(record, Environment)), None)
-    return [record for record in found if record is latest or _belongs(record, cases)]
+    records_now = standing(records)
+    latest = next((record for record in reversed(records_now) if isinstance(record, Environment)), None)
+    return [record for record in records_now if record is latest or _belongs(record, cases)]
 
 
 def _belongs(record: Record, cases: set[str]) -> bool:

@@ -114,7 +114,7 @@ def owner(top: str) -> Distribution | None:
 @cache
 def _installed() -> list[tuple[Distribution, str]]:
     """Installed distributions with their lists of files, "" where a distribution keeps none."""
-    return [(each, f"\n{each.read_text('RECORD') or ''}".rstrip()) for each in distributions()]
+    return [(distribution, f"\n{distribution.read_text('RECORD') or ''}".rstrip()) for distribution in distributions()]
 
 
 def _absolute(package: str, node: ast.ImportFrom) -> str:
@@ -153,7 +153,7 @@ def _place(top: str) -> tuple[Path, ...]:
     if spec is None:
         return ()
     if spec.submodule_search_locations is not None:
-        return tuple(Path(each) for each in spec.submodule_search_locations)
+        return tuple(Path(location) for location in spec.submodule_search_locations)
     if spec.origin is None:
         return ()
     origin = Path(spec.origin)

@@ -71,10 +71,10 @@ def _problems(channel: str, routes: Sequence[RouteSignals], until: int) -> Itera
     equal = [other for other in others if not other.witness]
     if not any(first.independent_of(other) for other in equal):
         yield _alone(channel, first, equal)
-    for each in (first, *others):
-        if not np.isfinite(_doubt(each, channel, until)):
-            how = each.uncertainties[channel].how
-            yield f"[reference] {channel}: the uncertainty of {each.title} is none ({how}): {ADVICE}"
+    for route in (first, *others):
+        if not np.isfinite(_doubt(route, channel, until)):
+            how = route.uncertainties[channel].how
+            yield f"[reference] {channel}: the uncertainty of {route.title} is none ({how}): {ADVICE}"
     for other in others:
         error, when = _distance(channel, first, other, until)
         doubt = _doubt(first, channel, until) + _doubt(other, channel, until)

@@ -57,4 +57,4 @@ def _at(times: Real, values: Real, when: float) -> tuple[float, float]:
         return float(np.interp(when, times, values)), float(np.max(np.abs(np.diff(values))))
     value = float(CubicSpline(times, values)(when))
     every_second = [float(CubicSpline(times[first::2], values[first::2])(when)) for first in (0, 1)]
-    return value, max(abs(each - value) for each in every_second)
+    return value, max(abs(sample - value) for sample in every_second)

@@ -41,16 +41,18 @@ def reference_at(
     assert recipe is not None
     asked = _joined(stored.times, times)
     kept, wanted = np.searchsorted(asked, stored.times), _nearest(asked, times)
-    found: dict[str, tuple[Real, Uncertainty]] = {}
+    references: dict[str, tuple[Real, Uncertainty]] = {}
     for route in _routes(case, recipe, stored, asked, provider, scheduler):
-        for name in (name for name in stored.channels if name in route.channels and name not in found):
-            found[name] = _channel(name, route, stored, kept, wanted)
-    here = {name: rows for name, (rows, _) in found.items()}
-    sizes = [Sizes(tuple(each), each.__getitem__) for each in (stored.channels, here)]
+        for name in (name for name in stored.channels if name in route.channels and name not in references):
+            references[name] = _channel(name, route, stored, kept, wanted)
+    here = {name: rows for name, (rows, _) in references.items()}
+    sizes = [Sizes(tuple(signals), signals.__getitem__) for signals in (stored.channels, here)]
     return {
-        name: Signal(*found[name], tuple(max(pair) for pair in zip(*(each.of(name) for each in sizes), strict=True)))
+        name: Signal(
+            *references[name], tuple(max(pair) for pair in zip(*(size.of(name) for size in sizes), strict=True))
+        )
         for name in stored.channels
-        if name in found
+        if name in references
     }
 
 

@@ -72,7 +72,7 @@ def run_routes(
 
     Files are evaluated first, since they may have errors.
     """
-    found = {
+    answers = {
         place: _of_file(case.folder / (route.exact or route.equations), route, times)
         for place, route in enumerate(recipe.routes)
         if not route.engine
@@ -80,8 +80,8 @@ def run_routes(
     results = _engine_results(case, recipe, times, provider, limits, scheduler, listener)
     for place, route in enumerate(recipe.routes):
         if route.engine:
-            found[place] = _of_engine(case, route, results[_name(place)])
-    return [found[place] for place in sorted(found)]
+            answers[place] = _of_engine(case, route, results[_name(place)])
+    return [answers[place] for place in sorted(answers)]
 
 
 def _name(place: int) -> str:
@@ -112,20 +112,22 @@ def _engine_results(
         planned = record, jobs_at(jobs, times)
         run_planned([planned], (), records, limits=limits, scheduler=scheduler, listener=listener)
         (results,) = collect(read(records)).cases
-    return {each.name: results.get(each.name, each.engines[0], MAIN) for each in variants}
+    return {variant.name: results.get(variant.name, variant.engines[0], MAIN) for variant in variants}
 
 
 def _refining(variants: Sequence[Variant]) -> tuple[Comparison, ...]:
     """Comparisons across variants, for which alone refined runs are planned: of the first with those refined."""
-    first, *others = (ComparisonSide(variant=each.name, engine=each.engines[0]) for each in variants)
-    refined = {each.name for each in variants if each.refined is not None}
-    return tuple(Comparison(name=each.variant, a=first, b=each, goals={}) for each in others if each.variant in refined)
+    first, *others = (ComparisonSide(variant=variant.name, engine=variant.engines[0]) for variant in variants)
+    refined = {variant.name for variant in variants if variant.refined is not None}
+    return tuple(
+        Comparison(name=other.variant, a=first, b=other, goals={}) for other in others if other.variant in refined
+    )
 
 
 def _as_variant(variant: Variant, given: str, name: str, route: ReferenceRoute, times: Real) -> Variant:
     """A route as a variant of its own. A witness by another discretisation than the `given` one knows no more than that
     says of its own error."""
-    efforts = tuple(each for each in route.efforts or variant.efforts if each.engine == route.engine)
+    efforts = tuple(effort for effort in route.efforts or variant.efforts if effort.engine == route.engine)
     return msgspec.structs.replace(
         variant,
         name=name,

@@ -51,7 +51,7 @@ def case_view(case: CaseResults, outcome: SessionOutcome, place: CasePlace, muta
     record = case.case
     verdicts = outcome.verdicts[record.case]
     lost = any(absence.case == record.case for absence in outcome.lost)
-    lost_controls = [each for each in outcome.lost_controls if each.case == record.case]
+    lost_controls = [control for control in outcome.lost_controls if control.case == record.case]
     return CaseView(
         place=place,
         name=record.case,
@@ -66,8 +66,8 @@ def case_view(case: CaseResults, outcome: SessionOutcome, place: CasePlace, muta
         controls=control_block(verdicts),
         lost_controls=lost_controls,
         absences=[absence for absence in outcome.absences if absence.case == record.case],
-        inapplicable=[each for each in outcome.inapplicable if each.case == record.case],
-        unjudged=grouped(each for each in outcome.unjudged if each.case == record.case),
+        inapplicable=[absence for absence in outcome.inapplicable if absence.case == record.case],
+        unjudged=grouped(channel for channel in outcome.unjudged if channel.case == record.case),
         unreferenced=f"It {NO_REFERENCE.format(record.case)}" if record.case in outcome.unreferenced else "",
         timings=_timings(case),
         peaks=largest_loads(case),

@@ -44,7 +44,7 @@ def write_summary(outcome: SessionOutcome, file: Path) -> None:
             lines += ["", f"... and {len(outcome.unexpected) - SHOWN} more, in verdicts.json."]
     if outcome.lost_controls:
         lines += ["", "## Deliberate faults that were compared in nothing", ""]
-        lines += [f"- {_flat(str(each))}" for each in outcome.lost_controls]
+        lines += [f"- {_flat(str(control))}" for control in outcome.lost_controls]
     if outcome.contracts:
         lines += ["", "## Contracts of outside engines", ""]
         lines += [f"- {_flat(state.words(name))}" for name, state in outcome.contracts.items()]
@@ -55,9 +55,11 @@ def write_summary(outcome: SessionOutcome, file: Path) -> None:
         lines += _table("No accepted figures", outcome.unrecorded, lambda verdict: "`crosscheck run --accept` records")
     if outcome.absences:
         lines += ["", "## What did not run to the end, and why", ""]
-        for each in outcome.absences:
-            what = _flat(f"{each.case}, {each.variant}, {each.engine}{role_words(each.role)}: {each.reason}")
-            lines.append(f"- **{each.status}** {what}")
+        for absence in outcome.absences:
+            what = _flat(
+                f"{absence.case}, {absence.variant}, {absence.engine}{role_words(absence.role)}: {absence.reason}"
+            )
+            lines.append(f"- **{absence.status}** {what}")
     if outcome.inapplicable:
         lines += ["", "## Not applicable", ""]
         for apart in outcome.inapplicable:
@@ -80,10 +82,10 @@ def add_differences(differences: Differences, file: Path) -> None:
     """Add to summary.md what changed since a baseline, which then decides whether the session fails."""
     kept = "❌ Worse than the baseline" if differences.regressed else "✅ Nothing is worse than the baseline"
     lines = ["", f"## {kept}", "", _flat(differences.headline), ""]
-    shown = [each for each in differences.changes if each.direction != "new"]
-    for each in shown[:SHOWN]:
-        where = ", ".join(part for part in (each.case, each.comparison, each.what) if part)
-        lines.append(f"- **{each.direction}** {_flat(f'{where}: {each.how}')}")
+    shown = [change for change in differences.changes if change.direction != "new"]
+    for row in shown[:SHOWN]:
+        where = ", ".join(part for part in (row.case, row.comparison, row.what) if part)
+        lines.append(f"- **{row.direction}** {_flat(f'{where}: {row.how}')}")
     if len(shown) > SHOWN:
         lines.append(f"- ... and {len(shown) - SHOWN} more: `crosscheck compare --verbose` shows all")
     lines += [f"- note: {_flat(note)}" for note in differences.notes]
@@ -101,7 +103,7 @@ def _claims(outcome: SessionOutcome) -> list[str]:
         lambda verdict: f"{verdict.status}: {verdict.expected_reason} ({verdict.own_failure})",
     )  # fmt: skip
     if outcome.idle_claims:
-        lines += ["", "## Expectations that name nothing", "", *(f"- {_flat(each)}" for each in outcome.idle_claims)]
+        lines += ["", "## Expectations that name nothing", "", *(f"- {_flat(claim)}" for claim in outcome.idle_claims)]
     return lines
 
 

@@ -44,16 +44,16 @@ def write_junit(outcome: SessionOutcome, file: Path, session: Session = NO_SESSI
         suite = ElementTree.SubElement(suites, "testsuite", name=case)
         _properties(suite, session, known.get(case))
         times = _times(known.get(case), verdicts)
-        missing = [each for each in outcome.lost if each.case == case]
-        gone = {(each.variant, each.engine) for each in missing}
+        missing = [loss for loss in outcome.lost if loss.case == case]
+        gone = {(loss.variant, loss.engine) for loss in missing}
         tests = [
-            _test(suite, each, _complaint(outcome, each), bool(gone & set(each.sides)), seconds)
-            for each, seconds in zip(verdicts, times, strict=True)
+            _test(suite, verdict, _complaint(outcome, verdict), bool(gone & set(verdict.sides)), seconds)
+            for verdict, seconds in zip(verdicts, times, strict=True)
         ]
-        for each in missing:
-            name = f"{each.variant} by {each.engine}{role_words(each.role)} ran"
-            _failed(suite, case, name, each.status, each.reason)
-        lost = [each for each in outcome.lost_controls if each.case == case]
+        for loss in missing:
+            name = f"{loss.variant} by {loss.engine}{role_words(loss.role)} ran"
+            _failed(suite, case, name, loss.status, loss.reason)
+        lost = [control for control in outcome.lost_controls if control.case == case]
         for control in lost:
             _failed(suite, case, f"{control.control} is noticed", "nothing", str(control))
         tests += ["failure"] * (len(missing) + len(lost)) + _not_judged(suite, case, outcome)
@@ -98,12 +98,14 @@ def _failed(suite: ElementTree.Element, classname: str, name: str, kind: str, me
 def _not_judged(suite: ElementTree.Element, case: str, outcome: SessionOutcome) -> list[str]:
     """Add tests for what is not applicable in a case, and for a missing reference; returns their outcomes."""
     outcomes = []
-    for each in outcome.inapplicable:
-        if each.case == case:
-            test = ElementTree.SubElement(suite, "testcase", classname=case, name=f"{each.where} by {each.engine}")
-            ElementTree.SubElement(test, "skipped", message=f"not applicable: {each.reason}")
+    for absence in outcome.inapplicable:
+        if absence.case == case:
+            test = ElementTree.SubElement(
+                suite, "testcase", classname=case, name=f"{absence.where} by {absence.engine}"
+            )
+            ElementTree.SubElement(test, "skipped", message=f"not applicable: {absence.reason}")
             outcomes.append("skipped")
-    for group in grouped(each for each in outcome.unaccounted if each.case == case):
+    for group in grouped(channel for channel in outcome.unaccounted if channel.case == case):
         name = f"what {group.engine} offers on {group.variant} is judged: {', '.join(group.channels)}"
         test = ElementTree.SubElement(suite, "testcase", classname=case, name=name)
         kind = "failure" if outcome.strict else "skipped"
@@ -186,7 +188,7 @@ def _times(case: CaseResults | None, verdicts: list[Verdict]) -> list[float]:
     """Seconds of each verdict: its equal share of compiling and solving of the runs that it needs."""
     if case is None:
         return [0.0] * len(verdicts)
-    needed = [[key for key in _runs_of(each) if key in case.results] for each in verdicts]
+    needed = [[key for key in _runs_of(verdict) if key in case.results] for verdict in verdicts]
     users = Counter(key for keys in needed for key in keys)
     return [sum(_seconds(case.results[key]) / users[key] for key in keys) for keys in needed]
 

@@ -83,17 +83,17 @@ def read_scores(out: Path) -> Scores:
     if not file.is_file():
         return Scores()
     try:
-        found = msgspec.json.decode(read_text(file), type=_File)
+        file_content = msgspec.json.decode(read_text(file), type=_File)
     except (ValueError, OSError, RecursionError) as error:
         return Scores(error=f"{FILE} cannot be read: {error}")
-    cases = {each.case: _score(each) for each in found.cases}
-    if len(cases) < len(found.cases):
+    cases = {case.case: _score(case) for case in file_content.cases}
+    if len(cases) < len(file_content.cases):
         return Scores(error=f"{FILE} cannot be read: it names a case twice")
     return Scores(cases=cases)
 
 
 def _score(case: _Case) -> CaseScore:
-    mutations = [_scored(each) for each in case.mutants]
+    mutations = [_scored(mutant) for mutant in case.mutants]
     mutations += [ScoredMutation(mutation=p.mutation, target=p.target, reason=p.reason) for p in case.passed_over]
     return CaseScore(score=case.score, by_reference=case.score_by_reference, mutations=tuple(mutations))
 
@@ -104,6 +104,6 @@ def _scored(mutant: _Mutant) -> ScoredMutation:
         mutation=mutant.mutation,
         target=mutant.target,
         noticed=mutant.outcome == "noticed" if judged else None,
-        channels={name: each.status == "differ" for name, each in mutant.channels.items()},
+        channels={name: channel.status == "differ" for name, channel in mutant.channels.items()},
         reason=mutant.reason if judged else f"{mutant.outcome}: {mutant.reason}",
     )

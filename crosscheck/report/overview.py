@@ -78,16 +78,18 @@ def _row(case: CaseResults, outcome: SessionOutcome, engines: list[str], link: s
     verdicts = outcome.verdicts[name]
     lost = any(absence.case == name for absence in outcome.lost)
     whole = summary_cell(verdicts)
-    lost = lost or any(each.case == name for each in outcome.lost_controls)
+    lost = lost or any(control.case == name for control in outcome.lost_controls)
     look = "bad" if lost or name in outcome.idle else whole.look
     cells = [_engine_cell(name, engine, outcome) for engine in engines]
-    cells += [summary_cell([each for each in verdicts if each.kind == kind]) for kind in ("conservation", "control")]
+    cells += [
+        summary_cell([verdict for verdict in verdicts if verdict.kind == kind]) for kind in ("conservation", "control")
+    ]
     return CaseRow(
         name=name,
         title=run.title,
         link=link,
         look=look,
-        status="worse" if any(each.ok and each.worse for each in verdicts) and look != "bad" else look,
+        status="worse" if any(verdict.ok and verdict.worse for verdict in verdicts) and look != "bad" else look,
         verdicts=len(verdicts),
         words=" ".join((name, run.title, *run.tags)).lower(),
         cells=tuple(cells),
@@ -99,7 +101,7 @@ def _engine_cell(name: str, engine: str, outcome: SessionOutcome) -> VerdictCell
     if name in outcome.never_applicable.get(engine, ()):
         return INAPPLICABLE
     found = outcome.verdicts[name]
-    return summary_cell([each for each in found if each.kind == "comparison" and _takes_part(each, engine)])
+    return summary_cell([verdict for verdict in found if verdict.kind == "comparison" and _takes_part(verdict, engine)])
 
 
 def _takes_part(verdict: Verdict, engine: str) -> bool:

@@ -36,15 +36,15 @@ class PeakRow(NamedTuple):
 def largest_loads(case: CaseResults) -> list[PeakRow]:
     """The largest loads of each kind, by variant and channel, engines below each other."""
     chosen: dict[tuple[str, str], None] = {}
-    found = list(peaks(case, LOADS))
+    peak_loads = list(peaks(case, LOADS))
     kinds: dict[tuple[str, str, str], list[PeakOfChannel]] = {}
-    for peak in found:
+    for peak in peak_loads:
         kinds.setdefault((*peak.whose, family(peak.channel)), []).append(peak)
     for alike in kinds.values():
-        for peak in sorted(alike, key=lambda each: -each.size)[:MOST]:
+        for peak in sorted(alike, key=lambda peak_of_run: -peak_of_run.size)[:MOST]:
             if peak.size > 0.0:
                 chosen[peak.variant, peak.channel] = None
-    return [_row(peak) for key in chosen for peak in found if (peak.variant, peak.channel) == key]
+    return [_row(peak) for key in chosen for peak in peak_loads if (peak.variant, peak.channel) == key]
 
 
 def _row(peak: PeakOfChannel) -> PeakRow:
@@ -66,6 +66,6 @@ def _rows(case: CaseResults) -> Iterator[list[str | float]]:
     for peak in peaks(case):
         columns = peak.extremes.shape[1]
         for i, component in enumerate(components(peak.channel, columns)):
-            numbers = [float(each) for each in peak.extremes[:, i]]
+            numbers = [float(extreme) for extreme in peak.extremes[:, i]]
             names = [case.case.case, *peak.whose, peak.channel, component, unit(peak.channel)]
             yield [*names, *(numbers if peak.is_whole else [*numbers[:-1], ""]), peak.over]

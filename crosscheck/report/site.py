@@ -154,8 +154,8 @@ def _clear(site: Path) -> bool:
 
 
 def _engines(session: Session) -> list[tuple[str, str]]:
-    found: dict[str, set[str]] = {}
+    engines: dict[str, set[str]] = {}
     for case in session.cases:
         for (_, engine, _), result in case.results.items():
-            found.setdefault(engine, set()).update(run.version for run in result.runs)
-    return [(engine, ", ".join(sorted(versions)) or "did not run") for engine, versions in sorted(found.items())]
+            engines.setdefault(engine, set()).update(run.version for run in result.runs)
+    return [(engine, ", ".join(sorted(versions)) or "did not run") for engine, versions in sorted(engines.items())]

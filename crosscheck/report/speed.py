@@ -59,13 +59,13 @@ class SpeedView:
 
     @property
     def families(self) -> tuple[str, ...]:
-        return tuple(dict.fromkeys(each.family for each in self.charts))
+        return tuple(dict.fromkeys(chart.family for chart in self.charts))
 
     @property
     def data(self) -> dict[str, Any]:
         """What the script needs."""
         engines = [row.engine for row in self.rows]
-        return {"reached": REACHED, "engines": engines, "charts": [_drawn(each) for each in self.charts]}
+        return {"reached": REACHED, "engines": engines, "charts": [_drawn(chart) for chart in self.charts]}
 
 
 def speed_view(session: Session, places: Mapping[str, CasePlace]) -> SpeedView:
@@ -79,7 +79,7 @@ def speed_view(session: Session, places: Mapping[str, CasePlace]) -> SpeedView:
                 family = case.case.case.rpartition("/")[0].rpartition("/")[2].replace("_", " ") or "cases"
                 link = places[case.case.case].link("speed")
                 charts.append(ChartOfCase(family.capitalize(), case.case.run.title, link, chart, unit))
-    return SpeedView(tuple(charts), tuple(_rows([each.chart for each in charts])))
+    return SpeedView(tuple(charts), tuple(_rows([chart.chart for chart in charts])))
 
 
 def unit_of_time(chart: WorkPrecision) -> float | None:

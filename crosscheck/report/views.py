@@ -107,7 +107,11 @@ def conservation_block(verdicts: Iterable[Verdict]) -> Block | None:
     if not group:
         return None
     note = "Drift over the run, relative to the largest magnitude reached."
-    table = _table(group, lambda each: f"{each.comparison.capitalize()}, {each.variant_a}", lambda each: each.engine_a)
+    table = _table(
+        group,
+        lambda verdict: f"{verdict.comparison.capitalize()}, {verdict.variant_a}",
+        lambda verdict: verdict.engine_a,
+    )
     return _block("Conservation", note, group, table)
 
 
@@ -117,19 +121,23 @@ def control_block(verdicts: Iterable[Verdict]) -> Block | None:
     if not group:
         return None
     note = "Deliberate faults of the scene. A comparison that does not notice them proves nothing."
-    table = _table(group, lambda each: each.comparison, lambda each: f"{each.engine_a}, against {each.engine_b}")
+    table = _table(
+        group, lambda verdict: verdict.comparison, lambda verdict: f"{verdict.engine_a}, against {verdict.engine_b}"
+    )
     return _block("Negative controls", note, group, table)
 
 
 def _comparison(name: str, group: list[Numbered]) -> Block:
     first = group[0][1]
     note = "" if first.expected == "agree" else f"Expected here: {first.expected}, because {first.expected_reason}"
-    return _block(name, note, group, _table(group, lambda each: _kind(each.channel), lambda each: each.pair))
+    return _block(
+        name, note, group, _table(group, lambda verdict: _kind(verdict.channel), lambda verdict: verdict.pair)
+    )
 
 
 def _block(title: str, note: str, group: list[Numbered], table: VerdictTable) -> Block:
     verdicts = [verdict for _, verdict in group]
-    order = sorted(group, key=lambda each: each[1].ok)  # what is not as expected first
+    order = sorted(group, key=lambda item: item[1].ok)  # what is not as expected first
     lines = tuple(_line(number, verdict) for number, verdict in order)
     return Block(title, note, summary_cell(verdicts), _worst(verdicts), table, lines)
 
@@ -175,7 +183,7 @@ def _table(group: list[Numbered], row: Callable[[Verdict], str], column: Callabl
     rows = []
     for name in dict.fromkeys(map(row, verdicts)):
         inside = [verdict for verdict in verdicts if row(verdict) == name]
-        cells = [[verdict for verdict in inside if column(verdict) == each] for each in columns]
+        cells = [[verdict for verdict in inside if column(verdict) == heading] for heading in columns]
         rows.append(Row(name, tuple(map(summary_cell, cells))))
     return VerdictTable(columns, tuple(rows))
 

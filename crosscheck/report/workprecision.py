@@ -124,8 +124,8 @@ def _by(routes: tuple[str, ...]) -> str:
 def _most_certain(case: CaseResults, chart: Chart) -> _Reference | None:
     """The finished result of the reference variant with the smallest U in the observable, exact engines first."""
     variant = case.case.run.variant(chart.reference)
-    found = [case.get(variant.name, engine) for engine in variant.engines]
-    finished = [result for result in found if chart.observable in result.channels]
+    results = [case.get(variant.name, engine) for engine in variant.engines]
+    finished = [result for result in results if chart.observable in result.channels]
     exact = [result for result in finished if not result.finest.support] or finished
     doubts = [result.uncertainty(chart.observable).value for result in exact]
     close = [result for result, doubt in zip(exact, doubts, strict=True) if doubt <= RESOLVED * min(doubts)]

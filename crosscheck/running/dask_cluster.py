@@ -181,16 +181,16 @@ class _Dispatch:
             raise ClusterError(f"the Dask scheduler at {self.address} has dropped a job; what came before is recorded")
         try:
             limit_s = self.work.time_limit_s(self.work.jobs[number])
-            found: list[Event] = flight.future.result(timeout=limit_s + OVERHEAD_S)
+            events: list[Event] = flight.future.result(timeout=limit_s + OVERHEAD_S)
         except KilledWorker as error:
             times = error.allowed_failures + 1
-            found = [Event(number, "crashed", f"the Dask worker died, {times} times when it was tried again")]
+            events = [Event(number, "crashed", f"the Dask worker died, {times} times when it was tried again")]
         except Exception as error:
-            found = [Event(number, "crashed", f"its Dask task failed: {type(error).__name__}: {error}")]
+            events = [Event(number, "crashed", f"its Dask task failed: {type(error).__name__}: {error}")]
         flight.future.release()
-        if found[-1].kind == "ended":
+        if events[-1].kind == "ended":
             self.prepared.add((_host(flight.address), flight.kind))
-        yield from found
+        yield from events
 
     def _given_up(self) -> Iterator[Event]:
         """Stop the jobs whose Dask worker should have ended them long ago."""
@@ -204,13 +204,13 @@ class _Dispatch:
 
 def _require_same_sources(client: Client, address: str) -> None:
     try:
-        found = client.run(code_here)
+        sources = client.run(code_here)
     except Exception as error:
         raise ClusterError(
             f"a worker of {address} cannot load crosscheck ({type(error).__name__}: {error}): "
             "install there what is installed here"
         ) from None
-    others = sorted(worker for worker, code in found.items() if code != code_here())
+    others = sorted(worker for worker, code in sources.items() if code != code_here())
     if others:
         raise ClusterError(
             f"workers run other sources than this process: {', '.join(others)}; install them, and restart"

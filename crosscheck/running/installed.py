@@ -91,18 +91,18 @@ def tell(asked: tuple[str, str], emit: Callable[[EngineState], None]) -> None:
 def _describe(names: Sequence[str], provider: str, scheduler: Scheduler) -> list[EngineState]:
     """The states of engines; all but built-in ones are asked in processes of their own."""
     others = [(provider, name) for name in names if name not in BUILT_IN]
-    found = {name: _useless(name, "it gave no answer") for _, name in others}
-    found |= {name: _state(provider, name) for name in names if name in BUILT_IN}
+    reasons = {name: _useless(name, "it gave no answer") for _, name in others}
+    reasons |= {name: _state(provider, name) for name in names if name in BUILT_IN}
     if others:
         with tempfile.TemporaryDirectory() as folder:
             log = str(Path(folder) / "log")
             for event in scheduler(Work(tell, others, log, 1, str, lambda asked: ANSWER_LIMIT_S)):
                 _, name = others[event.job]
                 if event.kind == "emitted":
-                    found[name] = event.content
+                    reasons[name] = event.content
                 elif event.kind in ("crashed", "stopped"):
-                    found[name] = _useless(name, event.content)
-    return [found[name] for name in names]
+                    reasons[name] = _useless(name, event.content)
+    return [reasons[name] for name in names]
 
 
 def _state(provider: str, name: str) -> EngineState:
@@ -111,9 +111,9 @@ def _state(provider: str, name: str) -> EngineState:
 
     summary = ""
     try:
-        found = find_engine(provider, name)
-        summary = clean(str(getattr(found, "summary", "")))
-        return EngineState(name, checked_version(found.version()), "", summary)
+        engine_state = find_engine(provider, name)
+        summary = clean(str(getattr(engine_state, "summary", "")))
+        return EngineState(name, checked_version(engine_state.version()), "", summary)
     except EngineMissing as error:
         return EngineState(name, None, clean(str(error)), summary)
     except BrokenPlugIn as error:

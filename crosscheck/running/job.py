@@ -20,9 +20,9 @@ from flexmb.typing import Real
 def extended(ladder: Sequence[Effort], extra: Sequence[float], finer: int) -> tuple[Effort, ...]:
     """An engine's ladder, with `extra` values for the method of its finest effort, and then `finer` efforts more."""
     finest = ladder[-1]
-    alike = [each for each in ladder if (each.kind, each.method) == (finest.kind, finest.method)]
-    others = tuple(each for each in ladder if (each.kind, each.method) != (finest.kind, finest.method))
-    values = with_extra([each.value for each in alike], extra)
+    alike = [effort for effort in ladder if (effort.kind, effort.method) == (finest.kind, finest.method)]
+    others = tuple(effort for effort in ladder if (effort.kind, effort.method) != (finest.kind, finest.method))
+    values = with_extra([effort.value for effort in alike], extra)
     return (*others, *(replace(finest, value=value) for value in (*values, *continued(finest.kind, values, finer))))
 
 

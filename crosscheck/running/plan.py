@@ -93,7 +93,7 @@ def plan(
 def _with_efforts(run: RunFile, case: Case) -> RunFile:
     """The run file with extra efforts in the ladders that it prescribes."""
     variants = list(run.variants)
-    for engine in {each.engine: None for each in case.claims.efforts}:
+    for engine in {effort.engine: None for effort in case.claims.efforts}:
         variants = [with_efforts(variant, engine, case.claims.efforts_of(engine)) for variant in variants]
     return msgspec.structs.replace(run, variants=tuple(variants))
 
@@ -132,8 +132,7 @@ def _transformed(scene: Scene, variant: Variant) -> Scene:
 
 
 def _begun(scene: Scene, variant: Variant) -> Scene:
-    """The scene with its loops closed, or in its equilibrium where the variant begins there; a mutated one in its own.
-    """
+    """The scene with its loops closed, or in its equilibrium where a variant begins there; a mutated one in its own."""
     if not scene.constraints and variant.start is msgspec.UNSET:
         return scene
     from crosscheck.running import starts  # loads the compiler
@@ -277,16 +276,16 @@ def scene_basis(case: Case, variant: Variant) -> str:
 
 def _levels(scene: Scene) -> str:
     """The levels of the scene's bodies, as shown in verdicts: "rigid", "full", "full, rigid"."""
-    found = {body.level for body in scene.bodies if not isinstance(body, RigidBody)}
-    return ", ".join(sorted(found)) if found else "rigid"
+    levels = {body.level for body in scene.bodies if not isinstance(body, RigidBody)}
+    return ", ".join(sorted(levels)) if levels else "rigid"
 
 
 def _engines_compared_across(run: RunFile, variant: Variant) -> tuple[str, ...]:
     """Engines whose result of this variant is compared with another variant, so that its discretisation matters."""
     pairs: tuple[Comparison | Control, ...] = (*run.comparisons, *run.controls)
     crossing = [(a, b) for a, b in (pair.sides for pair in pairs) if a.variant != b.variant]
-    found = {side.engine for pair in crossing for side in pair if side.variant == variant.name}
-    return tuple(engine for engine in variant.engines if engine in found)
+    engines = {side.engine for pair in crossing for side in pair if side.variant == variant.name}
+    return tuple(engine for engine in variant.engines if engine in engines)
 
 
 def _with_polynomials(scene: Scene, more: int) -> Scene:

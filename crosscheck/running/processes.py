@@ -26,7 +26,7 @@ def memory_limit(workers: int) -> float:
 def memory_of(roots: Iterable[int]) -> dict[int, int]:
     """Resident memory in bytes of each process in `roots` together with its descendants."""
     held: dict[int, int] = dict.fromkeys(roots, 0)
-    parents = {each.pid: each.info["ppid"] for each in psutil.process_iter(["ppid"])}
+    parents = {process.pid: process.info["ppid"] for process in psutil.process_iter(["ppid"])}
     for pid in parents:
         ancestor: int | None = pid
         while ancestor is not None and ancestor not in held:

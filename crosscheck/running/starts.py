@@ -75,9 +75,9 @@ def beginning(scene: Scene, system: System, state: State) -> Scene:
     values = _Values(system, state)
     return msgspec.structs.replace(
         scene,
-        hinges=tuple(_hinge(each, values) for each in scene.hinges),
-        point_masses=tuple(_moved(each, values) for each in scene.point_masses),
-        wheels=tuple(_wheel(each, values) for each in scene.wheels),
+        hinges=tuple(_hinge(hinge, values) for hinge in scene.hinges),
+        point_masses=tuple(_moved(mass, values) for mass in scene.point_masses),
+        wheels=tuple(_wheel(wheel, values) for wheel in scene.wheels),
         modal_states=tuple(_modes(scene, values)),
     )
 
@@ -111,7 +111,7 @@ def _refuse_changes(scene: Scene) -> None:
 def _hinge(hinge: Hinge, values: _Values) -> Hinge:
     if not isinstance(hinge, Spherical | Free):
         return _moved(hinge, values)
-    q, u = (each.tolist() for each in values(hinge.name))
+    q, u = (value.tolist() for value in values(hinge.name))
     match hinge:
         case Spherical():
             return msgspec.structs.replace(hinge, quaternion=tuple(q), angular_velocity_rad_s=tuple(u))
@@ -124,15 +124,15 @@ def _hinge(hinge: Hinge, values: _Values) -> Hinge:
 
 def _moved(item: Item, values: _Values) -> Item:
     """The scalar coordinates of a hinge or a point mass; prescribed ones keep what they are."""
-    every = [each for _, each in coordinates(item)]
+    every = [coordinate for _, coordinate in coordinates(item)]
     if not every:
         return item
     return with_coordinates(
         item,
         [
-            each if each.prescribed is not None
-            else msgspec.structs.replace(each, **{each.KEYS.value: value, each.KEYS.rate: rate})
-            for each, value, rate in zip(every, *(part.tolist() for part in values(item.name)), strict=True)
+            coordinate if coordinate.prescribed is not None
+            else msgspec.structs.replace(coordinate, **{coordinate.KEYS.value: value, coordinate.KEYS.rate: rate})
+            for coordinate, value, rate in zip(every, *(part.tolist() for part in values(item.name)), strict=True)
         ],
     )  # fmt: skip
 
@@ -144,10 +144,10 @@ def _wheel(wheel: Wheel, values: _Values) -> Wheel:
 
 def _modes(scene: Scene, values: _Values) -> list[ModalState]:
     """Those of all bodies that bend at the start or have a modal state in the scene."""
-    known = {each.body for each in scene.modal_states}
-    found = []
+    known = {state.body for state in scene.modal_states}
+    modes = []
     for body in scene.bodies:
         eta, rate = values(f"{body.name}.modes")
         if body.name in known or np.any(eta) or np.any(rate):
-            found.append(ModalState(body=body.name, coordinates=tuple(eta.tolist()), rates=tuple(rate.tolist())))
-    return found
+            modes.append(ModalState(body=body.name, coordinates=tuple(eta.tolist()), rates=tuple(rate.tolist())))
+    return modes

@@ -44,22 +44,22 @@ def undetermined(scene: Scene, t_end: float | None = None) -> tuple[str, ...]:
         return ()
     with asking("general"):
         try:
-            found = _open(scene)
+            names = _open(scene)
         except NotImplementedError:  # the dense route has no bodies of Standard Input Data
             return tuple(sorted(_by_flexmb(scene)))
-        if t_end is not None and (found or _holds(scene)):
-            found |= _open_in_run(scene, t_end)
-    return tuple(sorted(found))
+        if t_end is not None and (names or _holds(scene)):
+            names |= _open_in_run(scene, t_end)
+    return tuple(sorted(names))
 
 
 def _by_flexmb(scene: Scene) -> set[str]:
     """What flexmb itself finds open at the start, for scenes that the dense route refuses."""
     system = compile(scene)
     state = system.initial_state
-    found = system.evaluate(state.t, state.q, state.u)
-    loads = {f"load:{name}.{part}" for name, load in found.loads.items() for part, at in PARTS
+    evaluation = system.evaluate(state.t, state.q, state.u)
+    loads = {f"load:{name}.{part}" for name, load in evaluation.loads.items() for part, at in PARTS
              if np.isnan(load[at]).any()}  # fmt: skip
-    return loads | {f"drive:{name}" for name, drive in found.drives.items() if np.isnan(drive).any()}
+    return loads | {f"drive:{name}" for name, drive in evaluation.drives.items() if np.isnan(drive).any()}
 
 
 def _open(scene: Scene) -> set[str]:
@@ -119,7 +119,9 @@ def _held_after(dense: DenseSystem, held: Held, name: str, after: State) -> Held
 def _holds(scene: Scene) -> bool:
     """Whether any event changes which coordinates are held."""
     actions = [action for event in scene.events for action in event.actions]
-    return any(isinstance(each, Latch | Release) or (isinstance(each, Impact) and each.rests) for each in actions)
+    return any(
+        isinstance(action, Latch | Release) or (isinstance(action, Impact) and action.rests) for action in actions
+    )
 
 
 def _places(dense: DenseSystem) -> dict[str, int]:
@@ -138,6 +140,6 @@ def _prescribed(dense: DenseSystem) -> Held:
 
 
 def _at(dense: DenseSystem, state: State, held: Held) -> set[str]:
-    found = open_loads(dense, state.q, held)
-    loads = {f"load:{name}.{part}" for name, is_open in found.loads.items() for part, at in PARTS if is_open[at].any()}
-    return loads | {f"drive:{name}" for name, is_open in found.drives.items() if is_open}
+    names = open_loads(dense, state.q, held)
+    loads = {f"load:{name}.{part}" for name, is_open in names.loads.items() for part, at in PARTS if is_open[at].any()}
+    return loads | {f"drive:{name}" for name, is_open in names.drives.items() if is_open}

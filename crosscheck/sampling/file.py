@@ -216,15 +216,15 @@ def _problems(sweep: SweepFile) -> Iterator[Defect]:
             if not isinstance(parameter, Values):
                 remedy = 'give distribution = "values"'
                 yield Defect(str(root.key("parameter", index)), "a grid needs the values themselves", remedy)
-        count = math.prod(len(each.values) for each in sweep.parameters if isinstance(each, Values))
+        count = math.prod(len(parameter.values) for parameter in sweep.parameters if isinstance(parameter, Values))
         if count > MOST_SAMPLES:
             yield Defect("$", f"{count} combinations are too many", f"leave at most {MOST_SAMPLES}")
     elif sweep.number is None or not 1 <= sweep.number <= MOST_SAMPLES:
         yield Defect("$.number", f"{sweep.number} samples make no sense", f"give `number`, 1 to {MOST_SAMPLES}")
     for key, names in (
         ("engines", sweep.engines),
-        ("parameter", [each.title for each in sweep.parameters]),
-        ("quantity", [each.name for each in sweep.quantities]),
+        ("parameter", [parameter.title for parameter in sweep.parameters]),
+        ("quantity", [quantity.name for quantity in sweep.quantities]),
     ):
         if not names or len(set(names)) < len(names) or not all(names):
             yield Defect(str(root.key(key)), "needs one at least, with names that differ", "name each of them")

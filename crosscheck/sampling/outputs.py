@@ -131,21 +131,26 @@ def summarise(done: Sampled) -> SweepSummary:
     distributions = []
     for quantity in sweep.quantities:
         for engine in sweep.engines:
-            finished = [each for each in done.records if each.engine == engine and each.status == "finished"]
+            finished = [record for record in done.records if record.engine == engine and record.status == "finished"]
             if finished:
                 values = np.array([record.quantities[quantity.name] for record in finished])
                 numbers = np.array([record.sample for record in finished])
                 distributions.append(_distribution(quantity.name, engine, values, numbers, sweep.sampling != "grid"))
     failures = [
         Failure(
-            sample=each.sample, engine=each.engine, status=each.status, message=each.message, parameters=each.parameters
+            sample=record.sample,
+            engine=record.engine,
+            status=record.status,
+            message=record.message,
+            parameters=record.parameters,
         )
-        for each in done.records
-        if each.status != "finished"
+        for record in done.records
+        if record.status != "finished"
     ]
     return SweepSummary(
         title=sweep.title, sampling=sweep.sampling, seed=sweep.seed, samples=len(done.records) // len(sweep.engines),
-        statuses=dict(Counter(each.status for each in done.records)), distributions=distributions, failures=failures,
+        statuses=dict(Counter(record.status for record in done.records)), distributions=distributions,
+        failures=failures,
     )  # fmt: skip
 
 

@@ -113,7 +113,7 @@ def _engines(sweep: SweepFile, scene: Scene, duration_s: float, provider: str) -
             if effort.engine != name:
                 continue
             try:
-                own = {each.method for each in engine.efforts(scene)}
+                own = {effort.method for effort in engine.efforts(scene)}
             except Exception:  # it refuses the scene: every sample reports that
                 continue
             if wrong := _method(effort, own):

@@ -102,7 +102,7 @@ def run_sweep(
                 archive.write(record)
             add(record)
             used[event.job] = record
-            listener(len(used), len(jobs), sum(each.status != "finished" for each in used.values()))
+            listener(len(used), len(jobs), sum(result.status != "finished" for result in used.values()))
     return Sampled(sweep, tuple(used.get(number, job.blank) for number, job in enumerate(jobs)))
 
 
@@ -150,7 +150,9 @@ def _jobs(
 
 
 def _effort(sweep: SweepFile, engine: str) -> tuple[Effort, ...]:
-    return tuple(Effort(each.kind, each.value, each.method) for each in sweep.efforts if each.engine == engine)
+    return tuple(
+        Effort(effort.kind, effort.value, effort.method) for effort in sweep.efforts if effort.engine == engine
+    )
 
 
 def _known(records: Path) -> dict[tuple[str, ...], SampleRecord]:

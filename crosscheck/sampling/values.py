@@ -20,9 +20,7 @@ def with_values(scene: Scene, sweep: SweepFile, values: Iterable[float]) -> Scen
     for parameter, value in zip(sweep.parameters, values, strict=True):
         for path in parameter.paths:
 
-            def changed(
-                old: Any, path: str = path, value: float = value, relative: bool = parameter.relative
-            ) -> float:
+            def changed(old: Any, path: str = path, value: float = value, relative: bool = parameter.relative) -> float:
                 given = value * old if relative and isinstance(old, int | float) else value
                 return number_at(path, old, given)
 
@@ -62,19 +60,19 @@ def sample_values(sweep: SweepFile) -> Real:
     keeps the existing samples. A Latin hypercube with another number has entirely different samples.
     """
     if sweep.sampling == "grid":
-        axes = [each.values for each in sweep.parameters if isinstance(each, Values)]
+        axes = [parameter.values for parameter in sweep.parameters if isinstance(parameter, Values)]
         return np.array(list(itertools.product(*axes)))
     assert sweep.number is not None
     shape = (sweep.number, len(sweep.parameters))
     parts = _latin_hypercube(sweep.seed, *shape) if sweep.sampling == "latin_hypercube" else _random(sweep.seed, *shape)
     inside = np.clip(parts, np.finfo(float).tiny, None)  # the normal distribution has no quantile at 0
-    return np.column_stack([each.at(inside[:, column]) for column, each in enumerate(sweep.parameters)])
+    return np.column_stack([parameter.at(inside[:, column]) for column, parameter in enumerate(sweep.parameters)])
 
 
 def _random(seed: int, number: int, parameters: int) -> Real:
     """Independent points of the unit cube, (number, parameters)."""
     seeds = np.random.SeedSequence(seed).spawn(number)
-    return np.array([np.random.default_rng(each).random(parameters) for each in seeds])
+    return np.array([np.random.default_rng(seed).random(parameters) for seed in seeds])
 
 
 def _latin_hypercube(seed: int, number: int, parameters: int) -> Real:

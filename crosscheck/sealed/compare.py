@@ -69,7 +69,7 @@ class Differences:
     @property
     def headline(self) -> str:
         """The differences in one sentence."""
-        counts = {each: sum(change.direction == each for change in self.changes) for each in DIRECTIONS}
+        counts = {direction: sum(change.direction == direction for change in self.changes) for direction in DIRECTIONS}
         told = ", ".join(f"{count} {name}" for name, count in counts.items())
         return f"{told}, {self.same} the same"
 
@@ -85,13 +85,13 @@ def compare_results(old: SealedResults, new: SealedResults) -> Differences:
             direction: Direction = "new" if before is None else "gone"
             changes.append(ResultChange(direction, name, "", "", f"the case is {direction}"))
             if now is not None:
-                changes += [each for each in _verdicts(name, NOTHING, now) if each.direction == "worse"]
+                changes += [verdict for verdict in _verdicts(name, NOTHING, now) if verdict.direction == "worse"]
                 changes += _runs(name, NOTHING, now)
             continue
-        found = list(_verdicts(name, before, now))
+        differences = list(_verdicts(name, before, now))
         same += sum(len(table) for table in now.verdicts.values())
-        same -= sum(change.direction != "gone" for change in found)
-        changes += found
+        same -= sum(change.direction != "gone" for change in differences)
+        changes += differences
         changes += _runs(name, before, now)
         times += _times(name, before, now)
     changes += _session(old, new)
@@ -202,7 +202,7 @@ def _session(old: SealedResults, new: SealedResults) -> Iterator[ResultChange]:
 def _compared(session: SealedResults, engine: str) -> int:
     """The number of verdicts of an engine, controls apart."""
     tables = (table for case in session.cases.values() for table in case.verdicts.values())
-    sides = (what.split(" | ")[1:] for table in tables for what, each in table.items() if each.kind != "control")
+    sides = (what.split(" | ")[1:] for table in tables for what, verdict in table.items() if verdict.kind != "control")
     return sum(any(side.startswith(f"{engine} (") for side in pair) for pair in sides)
 
 
@@ -215,7 +215,7 @@ def _notes(old: SealedResults, new: SealedResults) -> Iterator[str]:
             yield f"{name}: other files than before: {', '.join(changed)}"
         if old.cases[name].claims != new.cases[name].claims:
             yield f"{name}: judged by other goals, failures or efforts of your own than before"
-        stale = sum(bool(each.stale) for table in new.cases[name].verdicts.values() for each in table.values())
+        stale = sum(bool(verdict.stale) for table in new.cases[name].verdicts.values() for verdict in table.values())
         if stale:
             yield f"{name}: {stale} accepted figures are stale, so that nothing is held against them"
     for what in ("engines", "strict"):

@@ -172,11 +172,11 @@ def _case(case: CaseResults, outcome: SessionOutcome) -> SealedCase:
             if peak.is_whole
         },
         not_applicable={
-            " | ".join(filter(None, (each.variant, each.engine, each.channel))): each.reason
-            for each in outcome.inapplicable
-            if each.case == name
+            " | ".join(filter(None, (absence.variant, absence.engine, absence.channel))): absence.reason
+            for absence in outcome.inapplicable
+            if absence.case == name
         },
-        unjudged={each.key: each.reason for each in outcome.unjudged if each.case == name},
+        unjudged={channel.key: channel.reason for channel in outcome.unjudged if channel.case == name},
         unreferenced=name in outcome.unreferenced,
         claims=None if case.case.claims == Claims() else case.case.claims,
     )

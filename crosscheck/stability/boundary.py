@@ -52,8 +52,8 @@ def judge(what: StabilityMap, mesh: CellMesh, records: dict[Cell, CellRecord]) -
     distance = _distances(what, measured, expected)
     place = np.unravel_index(int(np.argmax(distance)), distance.shape)
     farthest = int(distance[place])
-    found = [records[cell] for cell in cells]
-    if any(record.status == "did not run" for record in found) or bool(np.all(measured == NO_EVIDENCE)):
+    results = [records[cell] for cell in cells]
+    if any(record.status == "did not run" for record in results) or bool(np.all(measured == NO_EVIDENCE)):
         status = "did not run"
     else:
         status = "agree" if farthest <= ALLOWED else "differ"
@@ -62,8 +62,8 @@ def judge(what: StabilityMap, mesh: CellMesh, records: dict[Cell, CellRecord]) -
         title=what.title,
         status=status,
         distance=farthest if farthest < UNREACHABLE else -1,
-        worst="" if farthest == 0 else _place(what, x[place], y[place], found[number[place]], int(expected[place])),
-        cells=_counts(what, found),
+        worst="" if farthest == 0 else _place(what, x[place], y[place], results[number[place]], int(expected[place])),
+        cells=_counts(what, results),
         depth=mesh.depth,
         seconds=round(sum(record.cpu_s for record in records.values()), 1),
         overlay=what.overlay.name,
@@ -108,8 +108,8 @@ def _to(wanted: NDArray[np.bool_], what: StabilityMap) -> NDArray[np.intp]:
     """Chessboard distance of every place from the nearest wanted one, not across categories."""
     if what.y.categories or what.x.categories:
         lines = wanted.T if what.y.categories else wanted
-        found = np.array([_chessboard(line[None])[0] for line in lines])
-        return found.T if what.y.categories else found
+        signs = np.array([_chessboard(line[None])[0] for line in lines])
+        return signs.T if what.y.categories else signs
     return _chessboard(wanted)
 
 
@@ -121,9 +121,9 @@ def _chessboard(wanted: NDArray[np.bool_]) -> NDArray[np.intp]:
 
 def _place(what: StabilityMap, x: float, y: float, record: CellRecord, expected: int) -> str:
     named = f"{what.y.name} {what.y.categories[round(y)]}" if what.y.categories else f"{what.y.name} {y:.4g}"
-    found = label(what, record) + (f" ({record.message})" if record.message else "")
+    place = label(what, record) + (f" ({record.message})" if record.message else "")
     awaited = "that the theory says something" if expected == NO_PREDICTION else what.kinds[expected].name
-    return f"at {what.x.name} {x:.4g}, {named}: {found}, expected {awaited}"
+    return f"at {what.x.name} {x:.4g}, {named}: {place}, expected {awaited}"
 
 
 def _counts(what: StabilityMap, found: list[CellRecord]) -> dict[str, int]:

@@ -11,6 +11,6 @@ from crosscheck.stability.map import StabilityMap
 
 def stability_maps() -> dict[str, StabilityMap]:
     """The maps, by name."""
-    modules = (import_module(f"{maps.__name__}.{each.name}") for each in iter_modules(maps.__path__))
+    modules = (import_module(f"{maps.__name__}.{module.name}") for module in iter_modules(maps.__path__))
     found = [what for module in modules for what in module.MAPS]
     return {what.name: what for what in sorted(found, key=lambda what: what.name)}

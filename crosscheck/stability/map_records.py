@@ -64,5 +64,5 @@ def read(file: Path) -> list[Record]:
 
 def cells_of(records: Sequence[Record], wanted: str) -> dict[Cell, CellRecord]:
     """Cells recorded for the map of one identity, without those that did not run, which are run again."""
-    found = [each for each in records if isinstance(each, CellRecord) and each.identity == wanted]
+    found = [record for record in records if isinstance(record, CellRecord) and record.identity == wanted]
     return {record.cell: record for record in found if record.status != "did not run"}

@@ -40,12 +40,12 @@ def print_clauses(
 ) -> None:
     """What is broken, with the sentence of the contract; what to offer for clauses that were not tried, in a line each;
     the headline last. With VERBOSE every clause."""
-    for each in outcomes:
-        if verbosity is Verbosity.VERBOSE or (verbosity is Verbosity.NORMAL and each.status == "broken"):
-            text = f"{each.clause}: {each.status}" + (f": {each.message}" if each.message else "")
-            console.print(marked(*MARKS[each.status], text), soft_wrap=True)
-            if each.status == "broken":
-                console.print(words(f"  the contract says: {each.sentence}"), soft_wrap=True)
+    for outcome in outcomes:
+        if verbosity is Verbosity.VERBOSE or (verbosity is Verbosity.NORMAL and outcome.status == "broken"):
+            text = f"{outcome.clause}: {outcome.status}" + (f": {outcome.message}" if outcome.message else "")
+            console.print(marked(*MARKS[outcome.status], text), soft_wrap=True)
+            if outcome.status == "broken":
+                console.print(words(f"  the contract says: {outcome.sentence}"), soft_wrap=True)
     for offer, clauses in to_offer(list(outcomes)).items() if verbosity is not Verbosity.QUIET else ():
         many = f"{len(clauses)} clauses are" if len(clauses) > 1 else "1 clause is"
         console.print(marked("⊘", "yellow", f"{many} tried if you {offer}: {', '.join(clauses)}"), soft_wrap=True)

@@ -24,9 +24,9 @@ def cases_table(cases: Iterable[Case]) -> Listing:
     """The case library."""
     table = Listing(*names("case"), *prose("title", "tags", "variants", "engines"), *figures("accepted figures"))
     for case in cases:
-        engines = dict.fromkeys(name for each in case.run.variants for name in (*each.engines, *each.also))
+        engines = dict.fromkeys(name for variant in case.run.variants for name in (*variant.engines, *variant.also))
         variants = ", ".join(variant.name for variant in case.run.variants)
-        accepted = sum(len(each) for each in case.accepted.values())
+        accepted = sum(len(verdicts) for verdicts in case.accepted.values())
         tags = ", ".join(case.run.tags)
         table.add(case.name, case.run.title, tags, variants, ", ".join(engines), str(accepted or "none"))
     return table
@@ -69,28 +69,30 @@ def versions_text() -> str:
 
     lines = [f"crosscheck {version_of('flexmb')}", f"Python {platform.python_version()}, numba {version_of('numba')}"]
     alike: dict[str, list[str]] = {}
-    for each in describe_engines():
-        alike.setdefault(each.version or each.absence, []).append(each.name)
+    for engine in describe_engines():
+        alike.setdefault(engine.version or engine.absence, []).append(engine.name)
     lines += [f"{', '.join(engines)}: {text}" for text, engines in alike.items()]
     return "\n".join(lines)
 
 
 def print_bench(console: Console, bench: CaseBench) -> None:
     """Print a case: the equals with their ratios, those timed apart, and those not timed with the reason."""
-    levels = " and ".join(sorted({f"{each.rival.job.variant} ({each.rival.level})" for each in bench.contests}))
+    levels = " and ".join(
+        sorted({f"{contest.rival.job.variant} ({contest.rival.level})" for contest in bench.contests})
+    )
     title = f"\n{bench.case}, {levels}: equals are within {bench.accuracy:g} of the reference; {bench.rounds} rounds"
     console.print(words(title, "bold"), soft_wrap=True)
     if bench.problem:
         console.print(marked("✕", "red", bench.problem), soft_wrap=True)
         return
-    timed = [each for each in bench.contests if each.timed is not None]
+    timed = [contest for contest in bench.contests if contest.timed is not None]
     if timed:
         console.print(_timed_table(timed))
-    for each in bench.contests:
-        if each.standing == "apart":
-            console.print(marked("!", "yellow", f"{each.rival.name} is no equal: {each.why}"), soft_wrap=True)
-        elif each.standing == "not timed":
-            console.print(marked("✕", "red", f"{each.rival.name} is not timed: {each.why}"), soft_wrap=True)
+    for contest in bench.contests:
+        if contest.standing == "apart":
+            console.print(marked("!", "yellow", f"{contest.rival.name} is no equal: {contest.why}"), soft_wrap=True)
+        elif contest.standing == "not timed":
+            console.print(marked("✕", "red", f"{contest.rival.name} is not timed: {contest.why}"), soft_wrap=True)
 
 
 def _timed_table(timed: list[Contest]) -> Listing:
@@ -99,20 +101,20 @@ def _timed_table(timed: list[Contest]) -> Listing:
 
     right = figures("min", "quartiles", "ratio", "error", "compile", "again")
     table = Listing(*names("engine and effort"), *right)
-    equals = [each.best_s for each in timed if each.standing == "equal" and each.best_s is not None]
-    models = {(each.rival.job.variant, each.rival.level) for each in timed}
-    for each in timed:
-        assert each.timed is not None and each.timed.prepared is not None and each.rung is not None
-        stats = statistics(each)
-        job, level = each.rival.job, each.rival.level
+    equals = [contest.best_s for contest in timed if contest.standing == "equal" and contest.best_s is not None]
+    models = {(contest.rival.job.variant, contest.rival.level) for contest in timed}
+    for contest in timed:
+        assert contest.timed is not None and contest.timed.prepared is not None and contest.rung is not None
+        stats = statistics(contest)
+        job, level, rung = contest.rival.job, contest.rival.level, contest.rung
         table.add(
-            f"{job.engine if len(models) == 1 else f'{job.engine}, {job.variant} ({level})'} {each.rung.effort.label}",
+            f"{job.engine if len(models) == 1 else f'{job.engine}, {job.variant} ({level})'} {rung.effort.label}",
             seconds(stats.min),
             f"+{_percent(stats.q1, stats.min)} .. +{_percent(stats.q3, stats.min)} %",
-            f"{stats.min / min(equals):.3g}" if each.standing == "equal" else "apart",
-            f"{each.rung.error:.0e}",
-            seconds(each.rival.compile_s),
-            seconds(each.timed.prepared.again_s),
+            f"{stats.min / min(equals):.3g}" if contest.standing == "equal" else "apart",
+            f"{rung.error:.0e}",
+            seconds(contest.rival.compile_s),
+            seconds(contest.timed.prepared.again_s),
         )
     return table
 

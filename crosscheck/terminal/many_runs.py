@@ -55,9 +55,7 @@ def _run_map(
         def hear(what: StabilityMap, done: int, known: int) -> None:
             progress.update(task, completed=done, total=known, description=f"{name}: cells known so far")
 
-        return run_map(
-            name, records, depth=depth, fresh=fresh, limits=limits, scheduler=scheduler, listener=hear
-        )
+        return run_map(name, records, depth=depth, fresh=fresh, limits=limits, scheduler=scheduler, listener=hear)
 
 
 def _verdict_line(done: Finished, picture: Path) -> Text:
@@ -103,24 +101,24 @@ def print_summary(console: Console, summary: SweepSummary) -> None:
 
 def _table(summary: SweepSummary) -> Listing:
     table = Listing(*names("quantity", "in"), *figures("value", "standard error"))
-    several = len({each.engine for each in summary.distributions}) > 1
-    for each in summary.distributions:
-        name = f"{each.quantity} · {each.engine}" if several else each.quantity
-        for statistic, number, its_error in _lines(each):
+    several = len({distribution.engine for distribution in summary.distributions}) > 1
+    for distribution in summary.distributions:
+        name = f"{distribution.quantity} · {distribution.engine}" if several else distribution.quantity
+        for statistic, number, its_error in _lines(distribution):
             table.add(name, statistic, number, its_error)
     return table
 
 
-def _lines(each: Distribution) -> Iterator[tuple[str, str, str]]:
+def _lines(distribution: Distribution) -> Iterator[tuple[str, str, str]]:
     """Statistic, value, standard error."""
-    estimates = [("mean", each.mean), ("standard deviation", each.sd)]
-    estimates += [(QUANTILES.get(p, p), quantile) for p, quantile in each.quantiles.items()]
+    estimates = [("mean", distribution.mean), ("standard deviation", distribution.sd)]
+    estimates += [(QUANTILES.get(p, p), quantile) for p, quantile in distribution.quantiles.items()]
     for name, estimate in estimates:
         if estimate is not None:
             error = estimate.standard_error
             yield name, _digits(estimate), "" if error is None else f"{error:.2g}"
-    yield f"lowest, sample {each.lowest_at}", f"{each.lowest:.7g}", ""
-    yield f"highest, sample {each.highest_at}", f"{each.highest:.7g}", ""
+    yield f"lowest, sample {distribution.lowest_at}", f"{distribution.lowest:.7g}", ""
+    yield f"highest, sample {distribution.highest_at}", f"{distribution.highest:.7g}", ""
 
 
 def _digits(estimate: Estimated) -> str:

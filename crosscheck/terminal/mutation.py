@@ -20,28 +20,32 @@ STYLES = {"agree": "green", "not applicable": "dim"}
 def print_mutation_scores(console: Console, scores: Sequence[MutationScore], verbose: bool = False) -> int:
     """Print the scores; the exit code: 1 if the mean score is too low or something was not judged."""
     console.print(_table(scores))
-    for each in scores:
-        for mutant in each.missed:
-            console.print(words(f"missed: {each.case}: {_named(mutant)}: {mutant.reason}", "yellow"), soft_wrap=True)
-        for mutant in each.not_judged:
-            console.print(words(f"not judged: {each.case}: {_named(mutant)}: {mutant.reason}", "red"), soft_wrap=True)
+    for of_case in scores:
+        for mutant in of_case.missed:
+            console.print(words(f"missed: {of_case.case}: {_named(mutant)}: {mutant.reason}", "yellow"), soft_wrap=True)
+        for mutant in of_case.not_judged:
+            console.print(
+                words(f"not judged: {of_case.case}: {_named(mutant)}: {mutant.reason}", "red"), soft_wrap=True
+            )
         if verbose:
-            _details(console, each)
-    score = mean(each.score for each in scores)
-    judged = not any(each.not_judged or each.score is None for each in scores)
+            _details(console, of_case)
+    score = mean(score.score for score in scores)
+    judged = not any(score.not_judged or score.score is None for score in scores)
     good = judged and score is not None and score >= ENOUGH
     console.print(words(f"Mean mutation score {_figure(score)}; {ENOUGH:g} is asked for.", "green" if good else "red"))
-    console.print(words(f"By the stored references alone {_figure(mean(each.score_by_reference for each in scores))}."))
+    console.print(
+        words(f"By the stored references alone {_figure(mean(score.score_by_reference for score in scores))}.")
+    )
     return 0 if good else 1
 
 
 def _table(scores: Sequence[MutationScore]) -> Listing:
     table = Listing(*names("case"), *figures("noticed", "score", "at goals", "reference"))
-    for each in scores:
-        counted = each.counted
+    for score in scores:
+        counted = score.counted
         noticed = sum(mutant.outcome == "noticed" for mutant in counted)
-        shares = map(_figure, (each.score, each.score_at_goals, each.score_by_reference))
-        table.add(each.case, f"{noticed}/{len(counted)}", *shares)
+        shares = map(_figure, (score.score, score.score_at_goals, score.score_by_reference))
+        table.add(score.case, f"{noticed}/{len(counted)}", *shares)
     return table
 
 
@@ -70,10 +74,10 @@ def _named(mutant: Mutant) -> str:
 
 def print_invariances(console: Console, verdicts: Sequence[InvarianceVerdict], verbose: bool = False) -> int:
     """Print the verdicts; the exit code: 1 where one is neither *agree* nor *not applicable*."""
-    table = Listing(*names("case", *(each.name for each in INVARIANCES)))
+    table = Listing(*names("case", *(invariance.name for invariance in INVARIANCES)))
     for case in dict.fromkeys(verdict.case for verdict in verdicts):
         row = {verdict.invariance: verdict.status for verdict in verdicts if verdict.case == case}
-        table.add(case, *(_cell(row[each.name]) for each in INVARIANCES))
+        table.add(case, *(_cell(row[invariance.name]) for invariance in INVARIANCES))
     console.print(table)
     console.print(words("✓ the results are the same, – the invariance says nothing about the scene"))
     for verdict in verdicts:

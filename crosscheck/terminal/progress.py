@@ -149,7 +149,7 @@ class Bars(Progress):
     def get_renderables(self) -> Iterable[RenderableType]:
         """Running jobs below the whole, each kind with columns of its own."""
         tasks = [task for task in self.tasks if task.visible]
-        whole: list[ProgressColumn] = [each for each in self.columns if isinstance(each, ProgressColumn)]
+        whole: list[ProgressColumn] = [column for column in self.columns if isinstance(column, ProgressColumn)]
         yield _table(whole, [task for task in tasks if not task.fields.get("running")])
         yield _table(self._running, [task for task in tasks if task.fields.get("running")])
 
@@ -192,9 +192,7 @@ class Heartbeat:
     A thread prints, since a long run sends no events.
     """
 
-    def __init__(
-        self, console: Console, every_s: float = EVERY_S, clock: Callable[[], float] = time.monotonic
-    ) -> None:
+    def __init__(self, console: Console, every_s: float = EVERY_S, clock: Callable[[], float] = time.monotonic) -> None:
         self._console = console
         self._every_s = every_s
         self._clock = clock

@@ -44,8 +44,8 @@ def print_outcome(console: Console, outcome: SessionOutcome, verbosity: Verbosit
         shown = lines if verbosity is Verbosity.VERBOSE else lines[:LINES]
         for line in shown:
             console.print(line, soft_wrap=True)
-        for each in outcome.inapplicable if verbosity is Verbosity.VERBOSE else ():
-            text = f"{each.case}, {each.where}, {each.engine} not applicable: {each.reason}"
+        for absence in outcome.inapplicable if verbosity is Verbosity.VERBOSE else ():
+            text = f"{absence.case}, {absence.where}, {absence.engine} not applicable: {absence.reason}"
             console.print(marked("○", "dim", text), soft_wrap=True)
         for group in grouped(outcome.unjudged) if verbosity is Verbosity.VERBOSE else ():
             console.print(marked("○", "dim", str(group)), soft_wrap=True)
@@ -85,8 +85,8 @@ def _not_in_order(outcome: SessionOutcome) -> Iterator[Text]:
         yield marked("✕", "red", f"{where}: {worst.status}, expected {worst.expected}: {_reason(worst, group)}")
     for line in outcome.broken:
         yield marked("✕", "red", line)
-    for each in outcome.lost:
-        yield marked("–", "yellow", f"{each.case}, {each.variant}, {each.engine} {each.status}: {each.reason}")
+    for loss in outcome.lost:
+        yield marked("–", "yellow", f"{loss.case}, {loss.variant}, {loss.engine} {loss.status}: {loss.reason}")
     for engine in outcome.uncompared:
         yield marked("✕", "red", f"{engine} was asked for and compared in nothing{_first_reason(outcome, engine)}")
     for control in outcome.lost_controls:
@@ -141,10 +141,12 @@ def _reason(verdict: Verdict, group: Iterable[Verdict]) -> str:
     """Why a verdict is not as expected; and what to do for the one of its group that needs most, if that is known."""
     if verdict.own_failure and verdict.status == "agree":
         return f"you expect it to fail ({verdict.own_failure}): take that out if it is mended"
-    advised = [each for each in group if each.advice]
-    most = max(advised, key=lambda each: (each.U or 0.0) / each.goal, default=None)
+    advised = [verdict for verdict in group if verdict.advice]
+    most = max(advised, key=lambda verdict: (verdict.U or 0.0) / verdict.goal, default=None)
     if most is not None and most.advice.startswith(BEYOND):  # one goal for all of them
-        most = max((each for each in advised if each.advice.startswith(BEYOND)), key=lambda each: each.U or 0.0)
+        most = max(
+            (verdict for verdict in advised if verdict.advice.startswith(BEYOND)), key=lambda verdict: verdict.U or 0.0
+        )
     return verdict.reason if most is None else f"{verdict.reason}; {most.advice}"
 
 
@@ -154,15 +156,20 @@ def _by_claims(outcome: SessionOutcome) -> Iterator[Text]:
     for (reason, goal), count in loosened.items():
         verdicts = "1 verdict" if count == 1 else f"{count} verdicts"
         yield marked("!", "yellow", f"{verdicts} by the goal {goal:.2g}, looser than the case's: {reason}")
-    failures = Counter((each.own_failure, each.status, each.expected_reason) for each in outcome.own_failures)
+    failures = Counter(
+        (failure.own_failure, failure.status, failure.expected_reason) for failure in outcome.own_failures
+    )
     for (place, status, reason), count in failures.items():
         yield marked("!", "yellow", f"{count} {status}, as you expect: {reason} ({place})")
 
 
 def _first_reason(outcome: SessionOutcome, engine: str) -> str:
     """Why an engine has nothing to compare, if it gave a reason."""
-    mine = [each for each in outcome.inapplicable if each.engine == engine]
-    reasons = [f": {each.case}: {each.reason}" for each in sorted(mine, key=lambda each: not each.lies_with_engine)]
+    mine = [absence for absence in outcome.inapplicable if absence.engine == engine]
+    reasons = [
+        f": {absence.case}: {absence.reason}"
+        for absence in sorted(mine, key=lambda absence: not absence.lies_with_engine)
+    ]
     return reasons[0] if reasons else ""
 
 
@@ -187,8 +194,8 @@ def _verdict_table(verdicts: Sequence[Verdict]) -> Listing:
 
 
 def _count(group: list[Verdict], status: str) -> Text:
-    found = [verdict for verdict in group if verdict.status == status]
-    return words(str(len(found) or ""), "green" if all(verdict.ok for verdict in found) else "red")
+    verdicts = [verdict for verdict in group if verdict.status == status]
+    return words(str(len(verdicts) or ""), "green" if all(verdict.ok for verdict in verdicts) else "red")
 
 
 def _groups(verdicts: Iterable[Verdict]) -> dict[tuple[str, ...], list[Verdict]]:
@@ -205,8 +212,8 @@ def print_differences(console: Console, differences: Differences, verbosity: Ver
         everything = verbosity is Verbosity.VERBOSE
         changes = [marked(*DIRECTIONS[change.direction], _told(change)) for change in differences.changes]
         times = [
-            words(f"time: {each.case}, {each.what}: {each.before_s:.3g} s -> {each.now_s:.3g} s")
-            for each in differences.times
+            words(f"time: {time.case}, {time.what}: {time.before_s:.3g} s -> {time.now_s:.3g} s")
+            for time in differences.times
         ]
         notes = [words(f"note: {note}", "dim") for note in differences.notes]
         kinds = (changes, CHANGES, "changes"), (times, FEW_LINES, "times"), (notes, FEW_LINES, "notes")

@@ -73,8 +73,8 @@ def bench(
         return CaseBench(case.name, accuracy, rounds, problem=str(error))
     facts = facts_of(rivals.engines, provider)
     contests = [_entered(rival, facts[rival.job.engine], rivals, accuracy) for rival in rivals.found]
-    times = timed(((each.rival, each.rung) for each in contests if each.rung is not None), rounds)
-    contests = [_ended(each, times.get(id(each.rung)), rivals, accuracy) for each in contests]
+    times = timed(((contest.rival, contest.rung) for contest in contests if contest.rung is not None), rounds)
+    contests = [_ended(contest, times.get(id(contest.rung)), rivals, accuracy) for contest in contests]
     return CaseBench(case.name, accuracy, rounds, tuple(sorted(contests, key=_place)))
 
 
@@ -96,20 +96,21 @@ def _entered(rival: Rival, facts: EngineFacts, rivals: Rivals, accuracy: float) 
     return Contest(rival, facts, "equal", f"agrees with the reference, {accurate.error:.2g} from it", accurate)
 
 
-def _ended(each: Contest, measured: Timed | None, rivals: Rivals, accuracy: float) -> Contest:
+def _ended(contest: Contest, measured: Timed | None, rivals: Rivals, accuracy: float) -> Contest:
     """The contest with its times, unless the rival failed while it was timed or gave another result."""
     if measured is None:
-        return each
+        return contest
     if measured.failure or not measured.samples or measured.first is None:
         why = f"it passed the verdicts, but not its turns: {measured.failure or 'it took none'}"
-        return Contest(each.rival, each.facts, "not timed", why, each.rung)
-    errors = each.rival.errors(measured.first.times, measured.first.channels, rivals.reference)
+        return Contest(contest.rival, contest.facts, "not timed", why, contest.rung)
+    errors = contest.rival.errors(measured.first.times, measured.first.channels, rivals.reference)
     again = max(errors.values(), default=None)
-    if again is None or (each.standing == "equal" and not again <= accuracy):
-        why = f"what was timed is not what was judged: its error is {again} instead of {each.rung and each.rung.error}"
-        return Contest(each.rival, each.facts, "not timed", why, each.rung)
-    return Contest(each.rival, each.facts, each.standing, each.why, each.rung, measured)
+    if again is None or (contest.standing == "equal" and not again <= accuracy):
+        judged = contest.rung and contest.rung.error
+        why = f"what was timed is not what was judged: its error is {again} instead of {judged}"
+        return Contest(contest.rival, contest.facts, "not timed", why, contest.rung)
+    return Contest(contest.rival, contest.facts, contest.standing, contest.why, contest.rung, measured)
 
 
-def _place(each: Contest) -> tuple[int, float]:
-    return ("equal", "apart", "not timed").index(each.standing), each.best_s or 0.0
+def _place(contest: Contest) -> tuple[int, float]:
+    return ("equal", "apart", "not timed").index(contest.standing), contest.best_s or 0.0

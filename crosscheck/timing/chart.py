@@ -104,7 +104,7 @@ def _observables(case: Case, rivals: Rivals) -> list[str]:
     judged = list(dict.fromkeys(name for rival in rivals.found for name in rival.scales))
     if not judged:
         raise CaseError(f"{case.name}: no engine finished, so that there is nothing to draw: {_first(rivals)}")
-    wanted = dict.fromkeys(each.observable for each in case.run.charts)
+    wanted = dict.fromkeys(chart.observable for chart in case.run.charts)
     return [name for name in wanted if name in judged] or judged[:1]
 
 
@@ -162,11 +162,11 @@ def _quantile(rising: Sequence[float], part: float) -> float:
 def with_front(points: Sequence[ChartPoint], floor: float) -> list[ChartPoint]:
     """The same points, with `best` set for those on the Pareto front; errors below the floor count as equal."""
     smallest, front = inf, set()
-    timed = [each for each in points if each.solve_s is not None and each.error is not None]
-    for point in sorted(timed, key=lambda each: (each.solve_s, each.error)):
+    timed = [point for point in points if point.solve_s is not None and point.error is not None]
+    for point in sorted(timed, key=lambda point: (point.solve_s, point.error)):
         assert point.error is not None
         error = max(point.error, floor)
         if error < smallest:
             smallest = error
             front.add(id(point))
-    return [replace(each, best=True) if id(each) in front else each for each in points]
+    return [replace(point, best=True) if id(point) in front else point for point in points]

@@ -37,7 +37,7 @@ def write_case(charts: CaseCharts, out: Path) -> Path:
 
 def write_index(cases: Sequence[CaseCharts], out: Path) -> Path:
     """Write the index of all cases; returns its path."""
-    entries = [(each, folder_name(each.case)) for each in cases]
+    entries = [(case, folder_name(case.case)) for case in cases]
     write_whole(folder(out) / INDEX, _page("cases.html.j2", entries=entries, machine=environment()))
     return out / INDEX
 

@@ -92,7 +92,7 @@ class Rivals:
     @property
     def engines(self) -> list[str]:
         """The names of their engines, sorted."""
-        return sorted({each.job.engine for each in self.found})
+        return sorted({run.job.engine for run in self.found})
 
 
 ORDER = ("did not run", "crashed", "did not finish", "failed", "refused", "diverged", "differ", "unresolved", "agree")
@@ -129,9 +129,7 @@ def find_rivals(
         case=case,
         variant=held.variant,
         reference=reference,
-        found=tuple(
-            _rival(job, record.variants[job.variant].level, results, reference, held) for job in jobs
-        ),
+        found=tuple(_rival(job, record.variants[job.variant].level, results, reference, held) for job in jobs),
     )
 
 
@@ -139,7 +137,7 @@ def timed(entered: Iterable[tuple[Rival, Rung]], rounds: int) -> dict[int, Timed
     """Time rivals at these efforts in turns: what was measured, by the `id` of the effort's `Rung`."""
     pairs = list(entered)
     measured = in_turns([(rival.job, rung.effort) for rival, rung in pairs], rounds)
-    return {id(rung): each for (_, rung), each in zip(pairs, measured, strict=True)}
+    return {id(rung): timing for (_, rung), timing in zip(pairs, measured, strict=True)}
 
 
 def _reference(case: Case) -> RecordedReference:
@@ -162,7 +160,9 @@ def _rival(job: Job, level: str, case: CaseResults, reference: ReferenceSignals,
     asked, result = held.asked.get(job.engine) or _of_all(held), case.get(job.variant, job.engine)
     findings = list(hold(result, reference, asked, case.undetermined(job.variant)))
     scales = {name: finding.scale for name, _, finding in findings if finding.scale is not None and finding.scale > 0.0}
-    offered = [finding for _, _, finding in findings if finding.status != "refused"] or [each[2] for each in findings]
+    offered = [finding for _, _, finding in findings if finding.status != "refused"] or [
+        finding[2] for finding in findings
+    ]
     worst = min(offered, key=_place, default=Finding("did not run", "nothing of it can be judged"))
     return Rival(
         job=job,

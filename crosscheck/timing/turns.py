@@ -170,32 +170,32 @@ def in_turns(entries: Sequence[tuple[Job, Effort]], rounds: int) -> list[Timed]:
     with TemporaryDirectory() as folder:
         ask = _Asker(crew, str(Path(folder) / "log"))
         try:
-            for each in timed:
-                _prepare(each, timed, ask)
+            for candidate in timed:
+                _prepare(candidate, timed, ask)
             for number in range(rounds):
                 for place in range(len(timed)):
-                    each = timed[(place + number) % len(timed)]
-                    if not each.failure and each.first is not None:
-                        answer = ask(each, Turn(each.job, each.effort, each.first.solves))
-                        each.samples += answer if isinstance(answer, list) else []
+                    candidate = timed[(place + number) % len(timed)]
+                    if not candidate.failure and candidate.first is not None:
+                        answer = ask(candidate, Turn(candidate.job, candidate.effort, candidate.first.solves))
+                        candidate.samples += answer if isinstance(answer, list) else []
         finally:
             for worker in crew.values():
                 worker.dismiss()
     return timed
 
 
-def _prepare(each: Timed, timed: Sequence[Timed], ask: _Asker) -> None:
+def _prepare(candidate: Timed, timed: Sequence[Timed], ask: _Asker) -> None:
     """Compile, unless another effort of the same rival has done so, and solve once."""
-    same = [other for other in timed if other.job is each.job and (other.prepared or other.failure)]
+    same = [other for other in timed if other.job is candidate.job and (other.prepared or other.failure)]
     ready = next((other.prepared for other in same if other.prepared is not None), None)
     if ready is None and same:
-        each.failure = same[0].failure
+        candidate.failure = same[0].failure
         return
-    answer = ready or ask(each, Turn(each.job))
+    answer = ready or ask(candidate, Turn(candidate.job))
     if isinstance(answer, CompileTimes):
-        each.prepared = answer
-        first = ask(each, Turn(each.job, each.effort))
-        each.first = first if isinstance(first, FirstSolve) else None
+        candidate.prepared = answer
+        first = ask(candidate, Turn(candidate.job, candidate.effort))
+        candidate.first = first if isinstance(first, FirstSolve) else None
 
 
 class _Asker:
@@ -205,11 +205,11 @@ class _Asker:
         self._crew = crew
         self._log = log
 
-    def __call__(self, each: Timed, turn: Turn) -> Any:
+    def __call__(self, candidate: Timed, turn: Turn) -> Any:
         key = (turn.job.variant, turn.job.engine)
         worker = self._crew.setdefault(key, Worker())
         if turn.effort is not None and not worker.pid:
-            each.failure = "its process ended at another of its efforts"
+            candidate.failure = "its process ended at another of its efforts"
             return None
         worker.hand_out(0, turn, " ".join(key), take_turn, self._log, turn.job.time_limit_s)
         answer: Any = TurnFailure("it gave no answer")
@@ -224,5 +224,5 @@ class _Asker:
             if event.kind != "ended":
                 answer = TurnFailure(str(event.content))
             if isinstance(answer, TurnFailure):
-                each.failure = answer.message
+                candidate.failure = answer.message
             return answer

@@ -211,7 +211,9 @@ def _allowed(channel: str, target: Signal, goal: float) -> float:
 def _evidence(asked: _Asked, channel: str, values: Real, signals: Mapping[str, Signal], goal: float) -> Evidence:
     target = signals[channel]
     allowed = max(_allowed(channel, target, goal), target.uncertainty.value)
-    return Evidence(channel, values, asked.mine.times, {name: each.values for name, each in signals.items()}, allowed)
+    return Evidence(
+        channel, values, asked.mine.times, {name: signal.values for name, signal in signals.items()}, allowed
+    )
 
 
 def _jumping(

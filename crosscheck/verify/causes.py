@@ -36,8 +36,8 @@ POTENTIALS = ("energy.gravity", "energy.spring", "energy.strain")
 
 def possible_causes(seen: Evidence) -> tuple[str, ...]:
     """The possible faults of the values, in words, each of which makes them agree once it is put right."""
-    found = [*_by_corrections(seen), *about_other_points(seen)]
-    return tuple(dict.fromkeys(found)) or tuple(_shifts(seen))
+    causes = [*_by_corrections(seen), *about_other_points(seen)]
+    return tuple(dict.fromkeys(causes)) or tuple(_shifts(seen))
 
 
 def offset_totals(differing: Mapping[str, Evidence], found: Mapping[str, tuple[str, ...]]) -> dict[str, str]:

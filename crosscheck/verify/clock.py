@@ -63,8 +63,8 @@ def find_shift(
         if abs(late) > MOST * t_end or np.sum(inside) < FEWEST:
             return None
         there = reference_at(seen.times[inside] - late)
-        agreeing = tuple(name for name, each in differing.items() if _agrees(each, there, inside))
-        if len(agreeing) > 0.5 * sum(each.is_visible and each.varies for each in differing.values()):
+        agreeing = tuple(name for name, difference in differing.items() if _agrees(difference, there, inside))
+        if len(agreeing) > 0.5 * sum(difference.is_visible and difference.varies for difference in differing.values()):
             return Shift(late, agreeing, float(np.median(np.diff(seen.times))))
         if leading not in there:
             return None

@@ -158,8 +158,8 @@ def _columns(header: list[str], numbers: list[int], rows: Real, times: Real, clo
         if not name:
             raise VerifyError(f"column {header.index('') + 1} has no name: name it in the first line or leave it out")
         filled[name] = values
-    found = _stored_channels(filled) if stored else _own_channels(filled) if own else Columns(_channels(filled))
-    return replace(found, times=given)
+    columns = _stored_channels(filled) if stored else _own_channels(filled) if own else Columns(_channels(filled))
+    return replace(columns, times=given)
 
 
 def _check_times(numbers: list[int], given: Real, times: Real) -> None:
@@ -244,25 +244,25 @@ def _own_channels(filled: dict[str, Real]) -> Columns:
         if match is None:
             raise VerifyError(f'column "{header}" has no unit, unlike the first: write it "name [unit]"')
         units[match[1]], left[match[1]] = match[2], values
-    found: dict[str, Real] = {}
+    columns: dict[str, Real] = {}
     for item, _, part in [name.rpartition(".")[0].rpartition(".") for name in left]:
         if part in OWN_GROUPS:
             kind, signal = OWN_GROUPS[part]
             names = [f"{item}.{part}.{letter}" for letter in ("wxyz" if signal.width == 4 else "xyz")]
             if all(name in left for name in names):
                 _require_unit(names, units, signal.unit)
-                found[f"{kind}:{item}.{signal.name}"] = np.column_stack([left.pop(name) for name in names])
+                columns[f"{kind}:{item}.{signal.name}"] = np.column_stack([left.pop(name) for name in names])
     for signal in kind_named("momentum").parts:
         names = [f"momentum.{signal.name}.{letter}" for letter in "xyz"]
         if all(name in left for name in names):
             _require_unit(names, units, signal.unit)
-            found[f"momentum.{signal.name}"] = np.column_stack([left.pop(name) for name in names])
+            columns[f"momentum.{signal.name}"] = np.column_stack([left.pop(name) for name in names])
     for name in [name for name in left if name == "work" or name.startswith("energy.")]:
         _require_unit([name], units, "J")
-        found[name] = left.pop(name)[:, None]
-    if not found:
+        columns[name] = left.pop(name)[:, None]
+    if not columns:
         raise VerifyError("no column of it can be compared: write it with Trajectory.to_csv or `flexmb simulate`")
-    return Columns(found, own=True, left_out=tuple(left))
+    return Columns(columns, own=True, left_out=tuple(left))
 
 
 def _require_unit(names: Sequence[str], units: dict[str, str], expected: str) -> None:

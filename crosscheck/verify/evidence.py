@@ -57,8 +57,8 @@ class Evidence:
         """That part of the motion of every marker, by its name; of the channel's own item first."""
         ending = f".{part}"
         names = [name for name in self.channels if name.startswith("marker:") and name.endswith(ending)]
-        found = {name.removeprefix("marker:").removesuffix(ending): self.channels[name] for name in names}
-        return dict(sorted(found.items(), key=lambda pair: pair[0] != self.item))
+        paths = {name.removeprefix("marker:").removesuffix(ending): self.channels[name] for name in names}
+        return dict(sorted(paths.items(), key=lambda pair: pair[0] != self.item))
 
 
 def turned(quaternions: Real, vectors: Real) -> Real:

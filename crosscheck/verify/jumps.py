@@ -42,17 +42,17 @@ def at_jumps(
     suspects: Mapping[str, Suspect], times: Real, reference_at: Callable[[Real], Mapping[str, Real]], t_end: float
 ) -> dict[str, np.ndarray]:
     """For each suspected channel the indices of `times` (T,) s at which the reference jumps to or from its value."""
-    asked = {name: _around(times[each.places], each.near_s) for name, each in suspects.items()}
+    asked = {name: _around(times[suspect.places], suspect.near_s) for name, suspect in suspects.items()}
     inside = np.unique(np.concatenate([rows.ravel() for rows in asked.values()]))
     inside = inside[(inside >= 0.0) & (inside <= t_end)]
     if not len(inside):
         return {}
     there = reference_at(inside)
     jumps = {}
-    for name, each in suspects.items():
+    for name, suspect in suspects.items():
         if name in there:
-            flags = [_jumps(name, each, i, row, inside, there[name]) for i, row in enumerate(asked[name])]
-            jumps[name] = each.places[np.array(flags, bool)]
+            flags = [_jumps(name, suspect, i, row, inside, there[name]) for i, row in enumerate(asked[name])]
+            jumps[name] = suspect.places[np.array(flags, bool)]
     return jumps
 
 

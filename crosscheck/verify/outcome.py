@@ -65,7 +65,7 @@ def outcome_json(outcome: CsvOutcome) -> str:
             "left_out_s": detail.left_out if detail else (),
             "reason": verdict.reason,
         }
-    found = {
+    document = {
         "case": next(iter(outcome.verdicts)),
         "against": outcome.against,
         "ok": outcome.ok,
@@ -74,4 +74,4 @@ def outcome_json(outcome: CsvOutcome) -> str:
         "not_given": outcome.not_given,
         "channels": channels,
     }
-    return msgspec.json.format(msgspec.json.encode(found)).decode()
+    return msgspec.json.format(msgspec.json.encode(document)).decode()

@@ -125,8 +125,8 @@ def _says_enough(seen: Evidence, force: Real) -> bool:
 def _fitted(seen: Evidence, force: Real, axes: Real) -> Real | None:
     """The constant r (3,) in such `axes` (T,3,3), whose columns are their directions, if it makes the moment agree."""
     columns = _crossed(axes, force)
-    found = _least_squares(columns, seen.reference - seen.values)
-    return found if seen.agrees(seen.values + columns @ found) else None
+    fitted = _least_squares(columns, seen.reference - seen.values)
+    return fitted if seen.agrees(seen.values + columns @ fitted) else None
 
 
 def _crossed(axes: Real, force: Real) -> Real:
@@ -135,8 +135,8 @@ def _crossed(axes: Real, force: Real) -> Real:
 
 
 def _least_squares(columns: Real, wanted: Real) -> Real:
-    found = np.linalg.lstsq(columns.reshape(-1, columns.shape[2]), wanted.ravel(), rcond=1e-12)[0]
-    return np.asarray(found, float)
+    solution = np.linalg.lstsq(columns.reshape(-1, columns.shape[2]), wanted.ravel(), rcond=1e-12)[0]
+    return np.asarray(solution, float)
 
 
 def _moves(rows: Real) -> bool:

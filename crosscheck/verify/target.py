@@ -190,8 +190,8 @@ def _mass(body: Body) -> float | None:
             return body.mass_kg
         case BeamBody():
             stations = sorted(body.stations, key=lambda station: station.x_m)
-            places = [0.0, *(each.x_m for each in stations), body.length_m]
-            densities = [mass_per_length(each) for each in (stations[0], *stations, stations[-1])]
+            places = [0.0, *(station.x_m for station in stations), body.length_m]
+            densities = [mass_per_length(station) for station in (stations[0], *stations, stations[-1])]
             return float(np.trapezoid(densities, places)) + sum(tip.mass_kg for tip in body.tip_masses)
         case ModalBody() if body.points:
             return sum(point.mass_kg for point in body.points)

@@ -107,7 +107,7 @@ class Advice:
         asked = " and ".join(map(str, self.quantities))
         text = f"{self.name}: {asked} to {self.tolerance:g} of its scale, from 0 to {self.t_end:g} s. "
         if self.accepted:
-            models = "; ".join(f"{each.body} as {each.rung}" for each in self.bodies) or "the scene as it is"
+            models = "; ".join(f"{body.body} as {body.rung}" for body in self.bodies) or "the scene as it is"
             text += (
                 f"Take {models}, and integrate by {self.method}. The error of that run is {self.measured:.2g}, of "
                 f"which {self.uncertainty:.2g} is the uncertainty of what it was measured against, {self.reference}; "
@@ -212,7 +212,7 @@ class Prepared:
 
     def confirmation(self) -> Confirmation:
         """Run the references; returns what measures candidates against them. Raises NoReference."""
-        far = frozenset(name for name, each in self.known.items() if each.deflection > FAR)
+        far = frozenset(name for name, predicted in self.known.items() if predicted.deflection > FAR)
         known = references(self.bench.scene, far if self.known else softest(self.bench.scene))
         return Confirmation(self.bench, self.tolerance, self.hidden, self.cost, self.budget * REFERENCE, known)
 
@@ -279,21 +279,21 @@ def _finest(body: BeamBody | ModalBody) -> Level:
 
 def _ladders(scene: Scene, known: dict[str, Indicators], tolerance: float) -> dict[str, tuple[Step, ...]]:
     """The steps of every flexible body, by name, for the rungs that are possible for it."""
-    found = {}
+    ladders = {}
     for body in flexible_bodies(scene):
         of = known.get(body.name)
         excited = of.families_above(_EXCITED * tolerance) if of else frozenset[str]()
         far = of is None or body.level == EXACT or of_level(LEVELS[-1], of) > NEGLECTED * tolerance
         every = rungs(scene, body, excited, far)
         steps = [step(scene, body.name, rung, predicted(rung, of) if of else 0.0) for rung in every]
-        found[body.name] = tuple(each for each in steps if each is not None)
-    return found
+        ladders[body.name] = tuple(step for step in steps if step is not None)
+    return ladders
 
 
 def _trial(model: Model, steps: dict[tuple[str, BodyModel], Step], confirmation: Confirmation) -> Trial:
     return Trial(
         model,
-        sum(steps[each].error for each in model),
+        sum(steps[name].error for name in model),
         confirmation.error(model),
         confirmation.run_cost(model),
         confirmation.adequate(model),

@@ -30,15 +30,15 @@ def advice_tables(advice: Advice, trials: bool = True) -> RenderableType:
 
 
 def _asked(advice: Advice) -> Text:
-    wanted = ", ".join(str(each) for each in advice.quantities)
+    wanted = ", ".join(str(quantity) for quantity in advice.quantities)
     return Text(f"{advice.name}: {wanted} to {advice.tolerance:g} of its scale, 0 to {advice.t_end:g} s")
 
 
 def _bodies(advice: Advice) -> Listing:
     columns = (*names("body", "model"), *figures("its error, predicted"), *prose("because"))
     table = Listing(*columns, title="\nModel of each flexible body")
-    for each in advice.bodies:
-        table.add(each.body, str(each.rung), _number(each.predicted), each.reason)
+    for body in advice.bodies:
+        table.add(body.body, str(body.rung), _number(body.predicted), body.reason)
     return table
 
 
@@ -58,7 +58,7 @@ def _trials(advice: Advice) -> Listing:
     title = "\nModels that were run" + (f" (the {_SHOWN} cheapest)" if len(advice.trials) > _SHOWN else "")
     numbers = figures("predicted error", "measured error", "operations, finely integrated")
     table = Listing(*prose("model"), *numbers, *names(""), title=title)
-    for trial in sorted(advice.trials, key=lambda each: each.operations)[:_SHOWN]:
+    for trial in sorted(advice.trials, key=lambda row: row.operations)[:_SHOWN]:
         fits = Text("adequate", style="green") if trial.adequate else Text("no", style="red")
         table.add(
             ", ".join(_model(trial)), _number(trial.predicted), _number(trial.measured), _number(trial.operations), fits

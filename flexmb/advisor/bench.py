@@ -28,7 +28,9 @@ from flexmb.tables.state import pack
 
 SAMPLES = 401
 MAX_STEPS = 400_000
-EXACT = tuple(each.name for each in ALGORITHMS.values() if each.route is not None and not each.is_first_order)
+EXACT = tuple(
+    algorithm.name for algorithm in ALGORITHMS.values() if algorithm.route is not None and not algorithm.is_first_order
+)
 """Algorithms that solve the equations of a model without further truncation."""
 PREDICTED = {"articulated": cost.articulated, "composite": cost.composite}
 """Operations of an evaluation, by the number of modes of every body; all of `EXACT`."""
@@ -115,12 +117,12 @@ class Bench:
 
     def run(self, model: Model, method: RunMethod, most: float = np.inf) -> BenchRun:
         """The run, made at the first call and stopped after about `most` operations."""
-        found = self._outcomes.get((model, method))
-        if found is None or (found.cut and most > self._allowed[model, method]):
-            found = self._outcomes[model, method] = self._run(model, method, most)
+        outcome = self._outcomes.get((model, method))
+        if outcome is None or (outcome.cut and most > self._allowed[model, method]):
+            outcome = self._outcomes[model, method] = self._run(model, method, most)
             self._allowed[model, method] = most
-            self.spent += found.operations + _OVERHEAD
-        return found
+            self.spent += outcome.operations + _OVERHEAD
+        return outcome
 
     def _run(self, model: Model, method: RunMethod, most: float) -> BenchRun:
         system = self.system(model)

@@ -163,13 +163,13 @@ class Confirmation:
         """Error of a model, U included; infinite if it cannot be compiled or does not finish. Nothing is known of it,
         and it is infinite as well, if its run takes more than about `most` operations."""
         if model not in self.measured:
-            found = np.inf
+            error = np.inf
             if not isinstance(self.bench.system(model), str):
                 done = self.run(model, most)
                 if done.cut:
                     return np.inf
-                found = self._distance(done) + self.reference.uncertainty if done.finished else np.inf
-            self.measured[model] = found
+                error = self._distance(done) + self.reference.uncertainty if done.finished else np.inf
+            self.measured[model] = error
         return self.measured[model]
 
     def total_error(self, model: Model, method: RunMethod) -> float:
@@ -211,7 +211,7 @@ class Confirmation:
         chosen = ladders(highest, slow, algorithm, not scene.constraints, float(self.bench.times[1]))
         if scene.constraints and best.integrator == IMPLICIT:
             chosen = (tuple(self._method(model, IMPLICIT, rtol) for rtol in TOLERANCES), *chosen)
-        for ladder in sorted(chosen, key=lambda each: each[0].integrator != best.integrator):
+        for ladder in sorted(chosen, key=lambda ladder: ladder[0].integrator != best.integrator):
             if short and INTEGRATORS[ladder[0].integrator].linearises:
                 continue
             before: RunMethod | None = None
@@ -320,7 +320,6 @@ def hopeless(steps: Sequence[float], more: int, most: float) -> bool:
 
 
 def _remainder(apart: float, before: float) -> float:
-    """What a reference leaves that differs so much from the one before it, and that by `before` (0: unknown) from its.
-    """
+    """What a reference leaves that differs so much from the one before it, and that by `before` (0: unknown)."""
     falls = max(apart / before, SECOND_ORDER) if before > 0.0 else 1.0
     return apart * falls / (1.0 - falls) if falls < 0.5 else apart

@@ -42,7 +42,7 @@ def contribution(channel: str, rigid: RigidRun, scene: Scene, part: Moved) -> Re
     r = part.response
     if kind == "marker":
         name, _, what = rest.rpartition(".")
-        marker = next(each for each in scene.markers if each.name == name)
+        marker = next(marker for marker in scene.markers if marker.name == name)
         amount = r.eta if what in ("position", "orientation") else r.etad
         turning, moving = _carried(rigid, scene, marker, part)
         recoil = _recoil(rigid, scene, marker, part)

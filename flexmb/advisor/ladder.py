@@ -70,10 +70,10 @@ class Cost:
 
     def of(self, steps: Iterable[Step]) -> float:
         """Predicted operations of the scene with these rungs for its flexible bodies."""
-        each, fastest = self.rigid, 0.0
+        cost, fastest = self.rigid, 0.0
         for step in steps:
-            each, fastest = each + step.operations, max(fastest, step.fastest)
-        return each * max(self.slow, STAGES * self.t_end * fastest / STEP_AT_HIGHEST)
+            cost, fastest = cost + step.operations, max(fastest, step.fastest)
+        return cost * max(self.slow, STAGES * self.t_end * fastest / STEP_AT_HIGHEST)
 
 
 def rungs(
@@ -92,17 +92,17 @@ def rungs(
         sets.append(some)
     carries = body.modes.static or any(hinge.parent == body.name for hinge in scene.hinges)
     sets_of_strains = (False, True) if _stretches(body) else (False,)
-    found = [BodyModel("rigid"), BodyModel("sprung")]
+    models = [BodyModel("rigid"), BodyModel("sprung")]
     for families in sets:
         for level in LEVELS:
-            found += [BodyModel("modes", n, level, False, families) for n in COUNTS]
+            models += [BodyModel("modes", n, level, False, families) for n in COUNTS]
             if carries:
-                found += [BodyModel("modes", n, level, True, families) for n in (0, 1, 2, 4)]
+                models += [BodyModel("modes", n, level, True, families) for n in (0, 1, 2, 4)]
         if bends_far:
-            found += [_strains(n, pieces, more, families) for pieces, n in STRAINS for more in sets_of_strains]
-    found += [BodyModel("segments", pieces=n) for n in SEGMENTS]
-    found += [BodyModel("pieces", pieces=n, level=level) for n in PIECES for level in LEVELS[-2:]]
-    return tuple(found)
+            models += [_strains(n, pieces, more, families) for pieces, n in STRAINS for more in sets_of_strains]
+    models += [BodyModel("segments", pieces=n) for n in SEGMENTS]
+    models += [BodyModel("pieces", pieces=n, level=level) for n in PIECES for level in LEVELS[-2:]]
+    return tuple(models)
 
 
 def _stretches(body: BeamBody) -> bool:
@@ -172,7 +172,7 @@ def softest(scene: Scene) -> frozenset[str]:
 
 def _compliance(beam: BeamBody) -> float:
     """L^3 / (3 EI) (m/N) in its weak plane, of the stiffest section."""
-    sections = [stiffness_on_axis(each) for each in beam.stations]
+    sections = [stiffness_on_axis(station) for station in beam.stations]
     return beam.length_m**3 / (3.0 * float(max(min(K[ABOUT_Y, ABOUT_Y], K[ABOUT_Z, ABOUT_Z]) for K in sections)))
 
 
@@ -187,8 +187,8 @@ def step(scene: Scene, name: str, rung: BodyModel, error: float) -> Step | None:
         fastest = _fastest(next(b for b in scene.bodies if b.name == name), rung, parts)
     except ValueError:
         return None
-    each = sum(BY_NAME[level].cost * articulated([n]).total for n, level in counts)
-    return Step(rung, error, float(each), fastest)
+    cost = sum(BY_NAME[level].cost * articulated([n]).total for n, level in counts)
+    return Step(rung, error, float(cost), fastest)
 
 
 def cost(scene: Scene, t_end: float, slow: int) -> Cost:
@@ -200,13 +200,13 @@ def cost(scene: Scene, t_end: float, slow: int) -> Cost:
 def model_cost(scene: Scene, model: Model, known: Cost) -> float:
     """Predicted operations of a run of that model, infinite if a rung is not possible for its body."""
     steps = [step(scene, name, rung, 0.0) for name, rung in model]
-    return np.inf if None in steps else known.of(each for each in steps if each)
+    return np.inf if None in steps else known.of(step for step in steps if step)
 
 
 def highest_frequency(scene: Scene, model: Model) -> float:
     """Highest frequency (rad/s) or fastest decay (1/s) of any body with its base fixed; 0 if all are rigid."""
     steps = [step(scene, name, rung, 0.0) for name, rung in model]
-    return max((each.fastest for each in steps if each), default=0.0)
+    return max((step.fastest for step in steps if step), default=0.0)
 
 
 def _fastest(body: Body, rung: BodyModel, parts: list[Body]) -> float:
@@ -245,6 +245,6 @@ def _squares_of(body: BeamBody | ModalBody) -> tuple[tuple[float, ...], float]:
 
 def _beam_rate(beam: BeamBody) -> float:
     """sqrt(EI / (m L^4)) (rad/s) of the stiffest section."""
-    sections = ((stiffness_on_axis(each), mass_per_length(each)) for each in beam.stations)
+    sections = ((stiffness_on_axis(station), mass_per_length(station)) for station in beam.stations)
     stiffest = max(max(K[ABOUT_Y, ABOUT_Y], K[ABOUT_Z, ABOUT_Z]) / mass for K, mass in sections)
     return float(np.sqrt(stiffest / beam.length_m**4))

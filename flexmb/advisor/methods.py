@@ -110,11 +110,15 @@ def ladders(
     scene with all bodies rigid, and none is longer than `longest` (s), the interval of the output, in which any run
     makes a step at least. Integrators that linearise are tried on trees only, with the recursion.
     """
-    chosen = [each for each in INTEGRATORS.values() if tree or not each.linearises]
-    rates = {each.name: slow if each.linearises else max(highest, slow) for each in chosen}
+    chosen = [integrator for integrator in INTEGRATORS.values() if tree or not integrator.linearises]
+    rates = {integrator.name: slow if integrator.linearises else max(highest, slow) for integrator in chosen}
     return tuple(
-        _ladder(each, max(rates[each.name], STEPS[0] / longest), "articulated" if each.linearises else algorithm)
-        for each in sorted(chosen, key=lambda each: not each.linearises)
+        _ladder(
+            integrator,
+            max(rates[integrator.name], STEPS[0] / longest),
+            "articulated" if integrator.linearises else algorithm,
+        )
+        for integrator in sorted(chosen, key=lambda integrator: not integrator.linearises)
     )
 
 

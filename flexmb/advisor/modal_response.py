@@ -122,9 +122,7 @@ def modal_response(rigid: RigidRun, scene: Scene, body: BeamBody | ModalBody) ->
     omega = np.sqrt(np.maximum(np.diag(model.stiffness), 0.0))
     eta, etad = _oscillators(omega, np.diag(model.damping), force, rigid.run.t, _initial(scene, body, model))
     etadd = force - eta * omega**2 - etad * np.diag(model.damping)
-    return ModalResponse(
-        body, model, omega, _families(model), force, eta, etad, etadd, w, alpha, acceleration, loads
-    )
+    return ModalResponse(body, model, omega, _families(model), force, eta, etad, etadd, w, alpha, acceleration, loads)
 
 
 def eigenmodes(body: BeamBody | ModalBody) -> FlexibleModel:
@@ -190,7 +188,7 @@ def _oscillators(omega: Real, damping: Real, force: Real, times: Real, start: Re
 def _initial(scene: Scene, body: BeamBody | ModalBody, model: FlexibleModel) -> Real:
     """Initial eta and etad (m,2)."""
     start = np.zeros((model.mode_count, 2))
-    state = next((each for each in scene.modal_states if each.body == body.name), None)
+    state = next((state for state in scene.modal_states if state.body == body.name), None)
     if state is not None:
         # At level stiffened, equivalent masses would replace the points that both models have at level full.
         own = flexible_model(body if body.level == "exact" else replace(body, level="full"))
@@ -240,7 +238,7 @@ def _acting_on(rigid: RigidRun, scene: Scene, connector: BetweenNodes) -> Real:
     offset = np.array(connector.position_b_m)
     if connector.body_b == GROUND:
         return np.tile(offset, (len(rigid.run.t), 1))
-    node = node_frame(next(each for each in scene.bodies if each.name == connector.body_b), connector.node_b)
+    node = node_frame(next(body for body in scene.bodies if body.name == connector.body_b), connector.node_b)
     origin, turn = rigid.frame(connector.body_b)
     return origin + np.einsum("tij,j->ti", turn, np.array(node.position) + rotation_matrix(node.quaternion) @ offset)
 

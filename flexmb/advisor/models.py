@@ -23,7 +23,7 @@ from flexmb.scene.rest_curve import is_curved
 from flexmb.scene.schema import Scene
 from flexmb.surrogate import finite_segments, substructured
 
-LEVELS: tuple[Level, ...] = tuple(each.name for each in fidelity.LEVELS if each.flexible and not each.by_strain)
+LEVELS: tuple[Level, ...] = tuple(level.name for level in fidelity.LEVELS if level.flexible and not level.by_strain)
 """Levels of modes, each of which neglects less than the one before."""
 EXACT: Level = "exact"
 COUNTS = (1, 2, 3, 4, 6, 8)

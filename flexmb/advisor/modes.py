@@ -37,15 +37,15 @@ def with_modes(scene: Scene, name: str, count: int, level: Level, static: bool, 
     An initial modal state is projected onto the modes in the norm of kinetic energy. Raises ValueError if there are
     fewer modes.
     """
-    body = next(each for each in scene.bodies if each.name == name)
+    body = next(body for body in scene.bodies if body.name == name)
     if isinstance(body, BeamBody):
         new: BeamBody | ModalBody = _beam(body, count, level, static, families)
     elif isinstance(body, ModalBody):
         new = _raw(body, count, level)
     else:
         raise ValueError(f'body "{name}" has no modes')
-    bodies = tuple(new if each.name == name else each for each in scene.bodies)
-    states = tuple(_projected(body, new, each) if each.body == name else each for each in scene.modal_states)
+    bodies = tuple(new if body.name == name else body for body in scene.bodies)
+    states = tuple(_projected(body, new, state) if state.body == name else state for state in scene.modal_states)
     return replace(scene, bodies=bodies, modal_states=states)
 
 
@@ -60,7 +60,7 @@ def with_strains(
     A beam without curvatures has its stretch and shears instead. Raises ValueError for a beam that has no stretch
     beside its curvatures, and for several pieces of one that starts bent.
     """
-    body = next(each for each in scene.bodies if each.name == name)
+    body = next(body for body in scene.bodies if body.name == name)
     if not isinstance(body, BeamBody):
         raise ValueError(f'body "{name}" is no beam, and has no strains')
     chosen = _strains(body, polynomials, stretching, families)
@@ -73,16 +73,16 @@ def with_strains(
     )
     new = _cut(scene, replace(body, level="exact", mass="consistent", modes=modes))
     new = _damped(new, new.modes)
-    bodies = tuple(new if each.name == name else each for each in scene.bodies)
-    states = tuple(_projected(body, new, each) if each.body == name else each for each in scene.modal_states)
+    bodies = tuple(new if body.name == name else body for body in scene.bodies)
+    states = tuple(_projected(body, new, state) if state.body == name else state for state in scene.modal_states)
     return replace(scene, bodies=bodies, modal_states=states)
 
 
 def _cut(scene: Scene, beam: BeamBody) -> BeamBody:
     """The beam cut where its strains jump in this scene."""
-    bodies = tuple(beam if each.name == beam.name else each for each in scene.bodies)
-    found = cut_where_loaded(replace(scene, bodies=bodies, modal_states=()), beam.name)
-    return next(each for each in found.bodies if isinstance(each, BeamBody) and each.name == beam.name)
+    bodies = tuple(beam if body.name == beam.name else body for body in scene.bodies)
+    cut_scene = cut_where_loaded(replace(scene, bodies=bodies, modal_states=()), beam.name)
+    return next(body for body in cut_scene.bodies if isinstance(body, BeamBody) and body.name == beam.name)
 
 
 def _between(scene: Scene, beam: BeamBody, pieces: int) -> int | list[float]:
@@ -111,8 +111,10 @@ def all_families(beam: BeamBody) -> tuple[Family, ...]:
 def _strains(beam: BeamBody, count: int, stretching: bool, families: tuple[str, ...]) -> StrainPolynomials:
     own = all_strains(beam)
     if families:
-        own = tuple(each for each in own if each in families or dict(SHEARED).get(each) in families)
-    curved = tuple(each for each in own if each in CURVATURES) or own  # a rod that only stretches has no other strain
+        own = tuple(family for family in own if family in families or dict(SHEARED).get(family) in families)
+    curved = (
+        tuple(family for family in own if family in CURVATURES) or own
+    )  # a rod that only stretches has no other strain
     if stretching and own == curved:
         raise ValueError(f'beam "{beam.name}" has no stretch or shear: its families and its theory exclude them')
     return polynomials_of(own if stretching else curved, count)
@@ -178,11 +180,11 @@ def _raw(body: ModalBody, count: int, level: Level) -> ModalBody:
 
 def _second_order(node: ModalNode, X: Real) -> dict[str, Any]:
     """The second-order data of a node in the modes X (m,k), by the keys of the scene."""
-    found = {}
+    sizes = {}
     for name, array in node_arrays(node).items():
         turned = _square(array, X)
-        found[name] = _nested(turned if name == "force_stiffness" else np.moveaxis(turned, 0, -1))
-    return found
+        sizes[name] = _nested(turned if name == "force_stiffness" else np.moveaxis(turned, 0, -1))
+    return sizes
 
 
 def _nested(array: Real) -> tuple[Any, ...]:
@@ -221,13 +223,13 @@ def _projected(old: BeamBody | ModalBody, new: BeamBody | ModalBody, state: Moda
 
 def _on_equal_points(*bodies: BeamBody | ModalBody) -> Iterator[FlexibleModel]:
     """The models with equal inertia points: at stiffened each has its own equivalent masses, at exact Gauss points."""
-    exact = [each for each in bodies if isinstance(each, BeamBody) and each.level == "exact"]
-    for each in bodies:
-        if isinstance(each, BeamBody) and each.level == "exact":
+    exact = [body for body in bodies if isinstance(body, BeamBody) and body.level == "exact"]
+    for body in bodies:
+        if isinstance(body, BeamBody) and body.level == "exact":
             points = max(map(points_of_piece, exact))
-            yield flexible_model(replace(each, modes=replace(each.modes, points=points)))
+            yield flexible_model(replace(body, modes=replace(body.modes, points=points)))
         else:
-            yield flexible_model(replace(each, level="full"))
+            yield flexible_model(replace(body, level="full"))
 
 
 def _products(a: FlexibleModel, b: FlexibleModel) -> Real:
@@ -235,4 +237,3 @@ def _products(a: FlexibleModel, b: FlexibleModel) -> Real:
     moved_a, moved_b = mass_shapes(a), mass_shapes(b)
     turning = np.einsum("pim,pij,pjn->mn", a.rotation, a.inertia, b.rotation, optimize=True)
     return np.einsum("p,pim,pin->mn", a.mass, moved_a, moved_b, optimize=True) + turning
-

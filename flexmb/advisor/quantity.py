@@ -66,18 +66,18 @@ def quantities(words: str | Quantity | Sequence[str | Quantity] | None, scene: S
 def measured(wanted: tuple[Quantity, ...], run: Recorded) -> Signals:
     """The channels of a run that the quantities name, each (T,k). ValueError for a quantity without channels."""
     channels = channels_of(run)
-    found: Signals = {}
+    signals: Signals = {}
     for quantity in wanted:
         named = {name: values for name, values in channels.items() if matches(quantity.pattern, name)}
         if not named:
             raise ValueError(f"the scene has no quantity {quantity.pattern!r}: {closest(quantity.pattern, channels)}")
-        found |= named
-    return found
+        signals |= named
+    return signals
 
 
 def scales(wanted: tuple[Quantity, ...], reference: Mapping[str, Real]) -> dict[str, float]:
     """The scale of each channel's error, in the channel's unit. Raises ValueError for a signal without a range."""
-    found: dict[str, float] = {}
+    sizes: dict[str, float] = {}
     for quantity in wanted:
         named = [name for name in reference if matches(quantity.pattern, name)]
         for name in named:
@@ -87,7 +87,7 @@ def scales(wanted: tuple[Quantity, ...], reference: Mapping[str, Real]) -> dict[
                     "indeterminate; choose another quantity, or make bodies flexible"
                 )
             if quantity.scale is not None:
-                found[name] = quantity.scale
+                sizes[name] = quantity.scale
                 continue
             alike = [other for other in named if family(other) == family(name)]
             size = max(signal_range(other, reference[other]) for other in alike)
@@ -96,8 +96,8 @@ def scales(wanted: tuple[Quantity, ...], reference: Mapping[str, Real]) -> dict[
                     f"{name} does not change, so that its range is not a scale of errors: give a scale in "
                     f"{unit(name)}, such as {quantity.pattern}@1"
                 )
-            found[name] = size
-    return found
+            sizes[name] = size
+    return sizes
 
 
 def error(a: Mapping[str, Real], b: Mapping[str, Real], scale: Mapping[str, float]) -> float:

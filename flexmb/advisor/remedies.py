@@ -47,7 +47,7 @@ def _remedies(
         yield f"damping of {', '.join(ringing)}, whose modes ring to the end: `damping_ratio` or `viscosity_s`"
     if np.isfinite(needs):
         yield f"a longer budget, of {_above(needs, 2):g} in place of {budget:g}, so that a finer model may run"
-    loads = [str(each) for each in wanted if "load" in each.pattern or "drive" in each.pattern]
+    loads = [str(quantity) for quantity in wanted if "load" in quantity.pattern or "drive" in quantity.pattern]
     of = f", or another quantity than {', '.join(loads)}, which high modes move more than a path" if loads else ""
     such = f", such as {larger:g}," if (larger := _above(SAFE * reached, 1)) < 1.0 else ""
     yield f"a larger tolerance than {tolerance:g}{such} or a shorter time{of}"

@@ -68,11 +68,11 @@ def search(ladders: dict[str, tuple[Step, ...]], confirmation: Confirmation, bud
     finalists = sorted(adequate, key=confirmation.run_cost)[:FINALISTS]
     best, least = finalists[0], np.inf
     methods: dict[Model, RunMethod] = {}
-    for each in finalists:
-        methods[each] = confirmation.cheapest_method(each, least)
-        operations = confirmation.bench.run(each, methods[each]).operations
+    for finalist in finalists:
+        methods[finalist] = confirmation.cheapest_method(finalist, least)
+        operations = confirmation.bench.run(finalist, methods[finalist]).operations
         if operations < least:
-            best, least = each, operations
+            best, least = finalist, operations
     return Found(best, methods[best], walk.exhausted)
 
 
@@ -107,7 +107,9 @@ class _Walk:
         """
         if not self.predicted:
             known = [choice for model in self.confirmation.references if (choice := self.choice_of(model)) is not None]
-            for choice in sorted(known, key=lambda each: self.confirmation.run_cost(model_of(each))):
+            for choice in sorted(
+                known, key=lambda choice_of_models: self.confirmation.run_cost(model_of(choice_of_models))
+            ):
                 if self.fits(choice):
                     return choice
         every = (*self.way(), *self.finest())
@@ -118,8 +120,8 @@ class _Walk:
     def choice_of(self, model: Model) -> Choice | None:
         """The steps of a model, or None if one of its rungs is not among them."""
         steps = {name: {step.rung: step for step in self.ladders[name]}.get(rung) for name, rung in model}
-        found = {name: step for name, step in steps.items() if step is not None}
-        return found if len(found) == len(steps) else None
+        steps_of = {name: step for name, step in steps.items() if step is not None}
+        return steps_of if len(steps_of) == len(steps) else None
 
     def way(self) -> Iterator[Choice]:
         """For each highest frequency, lowest first, the rungs of least predicted error that do not exceed it."""
@@ -199,7 +201,7 @@ class _Walk:
         """A much cheaper adequate choice, with other rungs for several bodies; small predicted errors come first."""
         if len(self.ladders) < 2:
             return None
-        others = sorted(self.leaps(choice), key=lambda each: (_error(each), self.expected(each)))
+        others = sorted(self.leaps(choice), key=lambda leap: (_error(leap), self.expected(leap)))
         return self.first_cheaper(choice, others[:LEAPS])
 
     def first_cheaper(self, choice: Choice, others: list[Choice]) -> Choice | None:
@@ -219,8 +221,8 @@ class _Walk:
         by_rung = {name: {step.rung: step for step in self.steps(name)} for name in self.ladders}
         first, *rest = by_rung.values()
         for rung in first:
-            if all(rung in each for each in rest):
-                other = {name: each[rung] for name, each in by_rung.items()}
+            if all(rung in ladder for ladder in rest):
+                other = {name: ladder[rung] for name, ladder in by_rung.items()}
                 if self.expected(other) <= LEAP * self.expected(choice):
                     yield other
 
@@ -254,10 +256,10 @@ def _error(choice: Choice) -> float:
 def _best(steps: list[Step]) -> list[Step]:
     """The Pareto-optimal steps in error, operations and frequency; of equal ones the first."""
     merits = np.array([(step.error, step.operations, step.fastest) for step in steps]).reshape(-1, 3)
-    found = []
+    ladders = []
     for i, step in enumerate(steps):
         as_good = np.all(merits <= merits[i], axis=1)
         better = as_good & np.any(merits < merits[i], axis=1)
         if not np.any(better) and not np.any(as_good[:i]):
-            found.append(step)
-    return found
+            ladders.append(step)
+    return ladders

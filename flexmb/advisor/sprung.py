@@ -29,7 +29,7 @@ def spring_hinged(scene: Scene, name: str) -> Scene:
     at the clamp remain there. Raises ValueError if the body is not clamped, carries other bodies, or starts deformed,
     or if its modes do not turn it.
     """
-    body = next((each for each in scene.bodies if each.name == name), None)
+    body = next((body for body in scene.bodies if body.name == name), None)
     if not isinstance(body, BeamBody | ModalBody):
         raise ValueError(f'the scene has no flexible body "{name}"')
     if any(state.body == name for state in scene.modal_states):
@@ -69,9 +69,7 @@ def _spring(body: BeamBody | ModalBody, fit: HingeFit) -> Hinge:
     frame = Rotation.from_matrix(np.column_stack([first, second, np.cross(first, second)]))
     w, x, y, z = (float(value) for value in frame.as_quat(scalar_first=True))
     lag = _damping_rate(body)
-    turns = [
-        AngularCoordinate(stiffness_Nm_rad=float(k), damping_Nms_rad=lag * float(k)) for k in fit.hinge.stiffness
-    ]
+    turns = [AngularCoordinate(stiffness_Nm_rad=float(k), damping_Nms_rad=lag * float(k)) for k in fit.hinge.stiffness]
     point = vector(fit.hinge.point)
     placed: dict[str, Any] = {
         "name": f"{body.name}.spring", "parent": f"{body.name}.clamp", "child": body.name,

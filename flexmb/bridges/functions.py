@@ -51,16 +51,16 @@ class Function(ABC):
     def jacobians(self, q: Real, u: Real, third: Real, t: Real) -> Jacobians:
         """At the same arguments. DynamicsError or ValueError, with a note of its number, for a state without them."""
         n, nu = len(q), self.system.nu
-        found = Jacobians(*(np.empty((n, nu, *shape)) for shape in self.shapes))
+        jacobians = Jacobians(*(np.empty((n, nu, *shape)) for shape in self.shapes))
         for i in range(n):
             try:
                 parts = self._derivatives(self.system.state(q[i], u[i], float(t[i])), third[i])
             except (DynamicsError, ValueError) as error:  # no accelerations; not finite, no orientation
                 error.add_note(f"derivatives were asked for at this state, {i} of {n} counted from 0")
                 raise
-            for whole, part in zip(found, parts, strict=True):
+            for whole, part in zip(jacobians, parts, strict=True):
                 whole[i] = part
-        return found
+        return jacobians
 
 
 class Accelerations(Function):
@@ -68,11 +68,11 @@ class Accelerations(Function):
 
     def values(self, q: Real, u: Real, third: Real, t: Real) -> Real:
         third = arguments.array("forces", third)  # products of other types would have other bits
-        found = self.system.accelerations_batch(q, u, t).accelerations
-        for i in np.flatnonzero(np.any(third, axis=1) & np.isfinite(found).all(axis=1)).tolist():
+        accelerations = self.system.accelerations_batch(q, u, t).accelerations
+        for i in np.flatnonzero(np.any(third, axis=1) & np.isfinite(accelerations).all(axis=1)).tolist():
             state = self.system.state(q[i], u[i], float(t[i]))
-            found[i] += self.system.acceleration_derivatives(state).by_force @ third[i]
-        return found
+            accelerations[i] += self.system.acceleration_derivatives(state).by_force @ third[i]
+        return accelerations
 
     def _derivatives(self, state: State, third: Real) -> tuple[Real, Real, Real, Real]:
         d = self.system.acceleration_derivatives(state, third if np.any(third) else None)
@@ -83,13 +83,13 @@ class InverseDynamics(Function):
     """tau for given accelerations, the third argument."""
 
     def values(self, q: Real, u: Real, third: Real, t: Real) -> Real:
-        found = np.full((len(q), self.system.nu), np.nan)
+        forces = np.full((len(q), self.system.nu), np.nan)
         for i in range(len(q)):
             try:
-                found[i] = self.system.inverse_dynamics(self.system.state(q[i], u[i], float(t[i])), third[i])
+                forces[i] = self.system.inverse_dynamics(self.system.state(q[i], u[i], float(t[i])), third[i])
             except (DynamicsError, ValueError):
                 continue
-        return found
+        return forces
 
     def _derivatives(self, state: State, third: Real) -> tuple[Real, Real, Real, Real]:
         d = self.system.inverse_dynamics_derivatives(state, third)

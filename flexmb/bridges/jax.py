@@ -50,8 +50,8 @@ def _bridged(of: Function) -> Callable[..., jax.Array]:
     @jax.custom_jvp
     def function(*arguments: jax.Array) -> jax.Array:
         at_host = _many(of.values, of)
-        found: jax.Array = jax.pure_callback(at_host, result(nu), *arguments, vmap_method="broadcast_all")
-        return found
+        values: jax.Array = jax.pure_callback(at_host, result(nu), *arguments, vmap_method="broadcast_all")
+        return values
 
     @function.defjvp
     def _(arguments: Any, directions: Any) -> Any:
@@ -76,21 +76,21 @@ def _many(at_host: Callable[..., Any], of: Function) -> Callable[..., Any]:
         given = [np.asarray(x, float) for x in arguments]
         leading = given[0].shape[:-1]
         rows = [np.ascontiguousarray(x).reshape(-1, *shape) for x, shape in zip(given, of.shapes, strict=True)]
-        found = at_host(*rows)
-        if isinstance(found, tuple):
-            return tuple(part.reshape(*leading, *part.shape[1:]) for part in found)
-        return found.reshape(*leading, found.shape[-1])
+        values = at_host(*rows)
+        if isinstance(values, tuple):
+            return tuple(part.reshape(*leading, *part.shape[1:]) for part in values)
+        return values.reshape(*leading, values.shape[-1])
 
     return flat
 
 
 def _checked(x: Any, shape: tuple[int, ...]) -> jax.Array:
-    found = jnp.asarray(x, None if hasattr(x, "dtype") else float)
-    if found.dtype != jnp.float64:
+    array = jnp.asarray(x, None if hasattr(x, "dtype") else float)
+    if array.dtype != jnp.float64:
         raise TypeError(
-            f"an argument of type {found.dtype}: flexmb computes with 64 bits; call "
+            f"an argument of type {array.dtype}: flexmb computes with 64 bits; call "
             'jax.config.update("jax_enable_x64", True) first, and give floats'
         )
-    if found.shape != shape:
-        raise ValueError(f"an argument has the shape {found.shape} instead of {shape}; take jax.vmap for many states")
-    return found
+    if array.shape != shape:
+        raise ValueError(f"an argument has the shape {array.shape} instead of {shape}; take jax.vmap for many states")
+    return array

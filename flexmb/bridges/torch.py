@@ -55,8 +55,8 @@ def _bridged(of: Function) -> Callable[..., torch.Tensor]:
         third = torch.zeros_like(u) if third is None else third
         t = torch.zeros(leading, dtype=torch.float64) if t is None else t
         rows = [_checked(x, leading, shape) for x, shape in zip((q, u, third, t), of.shapes, strict=True)]
-        found: torch.Tensor = Bridged.apply(*rows)
-        return found.reshape(*leading, of.system.nu)
+        values: torch.Tensor = Bridged.apply(*rows)
+        return values.reshape(*leading, of.system.nu)
 
     return called
 

@@ -88,7 +88,7 @@ def assemble(
 
     m = whole(max((link.mode_count for link in chain), default=0))
     inertia, points, of_points = inertia_arrays(chain, m)
-    port_rows, of_ports = second_order_rows([each.node.second for each in ports], 0, m)
+    port_rows, of_ports = second_order_rows([port.node.second for port in ports], 0, m)
     points["point"]["second"], of_points = second_order_rows(of_points, len(of_ports), m)
 
     body = inertia.pop("body")
@@ -96,7 +96,7 @@ def assemble(
     _describe(body, chain, numbering)
     body["inboard_port"], body["outboard_port"] = at.inboard, at.outboard
     body["placement_position"], body["placement_rotation"] = placement.p, placement.R.reshape(-1, 9)
-    group(body, "port", [len(each) for each in ports_by_body])
+    group(body, "port", [len(ports) for ports in ports_by_body])
     for name, items in (("wheel", wheels), ("load", loads)):
         group(body, name, np.bincount(np.array([index[item.body] for item in items], int), minlength=len(chain)))
     _mark_first_contributions(body)
@@ -127,7 +127,9 @@ def assemble(
         **points,
         **sections,
     )
-    signals = {number: each for number, each in enumerate(functions.all()) if isinstance(each, s.ControlSignal)}
+    signals = {
+        number: function for number, function in enumerate(functions.all()) if isinstance(function, s.ControlSignal)
+    }
     return Assembled(constants, at.markers, at.closures, signals, functions.shared)
 
 

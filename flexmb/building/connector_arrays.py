@@ -30,7 +30,7 @@ Number = Callable[[s.Function | None], int]
 
 def between_nodes(scene: s.Scene) -> list[BetweenNodes]:
     """Connectors between two nodes, in the scene's order."""
-    return [each for each in scene.connectors if isinstance(each, BetweenNodes)]
+    return [connector for connector in scene.connectors if isinstance(connector, BetweenNodes)]
 
 
 def end_ports(scene: s.Scene, chain: list[BodyLink], index: dict[str, int]) -> list[tuple[int, Port] | None]:
@@ -38,12 +38,12 @@ def end_ports(scene: s.Scene, chain: list[BodyLink], index: dict[str, int]) -> l
 
     NotImplementedError where a body of level ruthless deforms at an end.
     """
-    found: list[tuple[int, Port] | None] = []
+    ports: list[tuple[int, Port] | None] = []
     for connector in between_nodes(scene):
         for side in "ab":
             body, node = getattr(connector, f"body_{side}"), getattr(connector, f"node_{side}")
             if body == GROUND:
-                found.append(None)
+                ports.append(None)
                 continue
             link = chain[index[body]]
             at = port(link.node(node), *_offset(connector, side), np.eye(3))
@@ -53,8 +53,8 @@ def end_ports(scene: s.Scene, chain: list[BodyLink], index: dict[str, int]) -> l
                     f'undeformed shape, so a spring at its node "{node}" would not respond to its deformation; use '
                     'level "linear" or "full"'
                 )
-            found.append((index[body], at))
-    return found
+            ports.append((index[body], at))
+    return ports
 
 
 def connector_arrays(
@@ -86,9 +86,9 @@ def connector_arrays(
             record["smoothing"] = max(SMOOTHING * connector.free_length_m, SMALLEST_SMOOTHING)
             record["function"] = number(connector.force_N)
             record["start"], record["stop"] = _add(laws, _pieces(by_stem(connector), connector.acts))
-    springs = [each for each in scene.connectors if isinstance(each, HingeSpring)]
-    along = [each for each in scene.connectors if isinstance(each, AlongHinge)]
-    others = [each for each in along if not isinstance(each, HingeSpring)]
+    springs = [connector for connector in scene.connectors if isinstance(connector, HingeSpring)]
+    along = [connector for connector in scene.connectors if isinstance(connector, AlongHinge)]
+    others = [connector for connector in along if not isinstance(connector, HingeSpring)]
     return {
         "connector": records,
         "end": sides,

@@ -40,29 +40,29 @@ def _modal_arrays(
     pairs = {name: strip_zeros((len(chain), m, m)) for name in ("mff", "stiffness", "damping")}
     modes = {name: strip_zeros((len(chain), 6, m)) for name in ("mfr", "gyration")}
     body["orthogonal"] = body["uncoupled"] = True
-    for k, each in bodies.items():
-        model, n = chain[k].model, len(each.mff)
-        body["rigid"][k], pairs["mff"][k, :n, :n] = each.rigid, each.mff
+    for k, body_of_link in bodies.items():
+        model, n = chain[k].model, len(body_of_link.mff)
+        body["rigid"][k], pairs["mff"][k, :n, :n] = body_of_link.rigid, body_of_link.mff
         pairs["stiffness"][k, :n, :n], pairs["damping"][k, :n, :n] = model.stiffness, model.damping
-        modes["mfr"][k, :, :n], modes["gyration"][k, :, :n] = each.mfr, each.gyration
-        body["orthogonal"][k] = _is_diagonal(each.mff)
+        modes["mfr"][k, :, :n], modes["gyration"][k, :, :n] = body_of_link.mfr, body_of_link.gyration
+        body["orthogonal"][k] = _is_diagonal(body_of_link.mff)
         body["uncoupled"][k] = _is_diagonal(model.stiffness) and _is_diagonal(model.damping)
     return pairs | modes
 
 
 def _integrals(bodies: dict[int, InertiaTables], body: a.Record, m: int) -> dict[str, NDArray[Any]]:
     """Modal integrals of the bodies that have some; writes the row of each to `body`."""
-    most = max((len(each.mff) for each in bodies.values()), default=0)  # not whole strips: the size is its cube
+    most = max((len(body.mff) for body in bodies.values()), default=0)  # not whole strips: the size is its cube
     empty = {
         "product": strip_zeros((m // ROW, 1 + m, NUMBERS * ROW)),
         "slope": np.zeros((most, most), a.SLOPE),
         "mass_slope": np.zeros((most, most, most)),
     }
-    found = {}
+    integrals = {}
     for name, one in empty.items():
         body[name] = -1
-        body[name][list(bodies)], found[name] = _rows([getattr(each, name) for each in bodies.values()], one)
-    return found | {"moves": moving_columns(found["product"])}
+        body[name][list(bodies)], integrals[name] = _rows([getattr(body, name) for body in bodies.values()], one)
+    return integrals | {"moves": moving_columns(integrals["product"])}
 
 
 def _points(
@@ -70,9 +70,9 @@ def _points(
 ) -> tuple[dict[str, NDArray[Any]], list[SecondOrder | None]]:
     """The points left to sum at run time, and the second-order field of each; writes each body's range to `body`."""
     counts = np.zeros(len(body), int)
-    counts[list(bodies)] = [0 if each.summed is None else len(each.summed.mass) for each in bodies.values()]
+    counts[list(bodies)] = [0 if body.summed is None else len(body.summed.mass) for body in bodies.values()]
     group(body, "point", counts)
-    turning = [(p, i) for p in (each.summed for each in bodies.values()) if p is not None for i in range(len(p.mass))]
+    turning = [(p, i) for p in (body.summed for body in bodies.values()) if p is not None for i in range(len(p.mass))]
     point = np.zeros(len(turning), a.POINT)
     for row, (p, i) in zip(point, turning, strict=True):
         row["section"] = -1 if p.section is None else p.section[i]
@@ -87,9 +87,9 @@ def _points(
 @lru_cache(maxsize=64)
 def _tables(level: FidelityLevel, model: FlexibleModel, wheels: int) -> InertiaTables:
     """The tables of a level. Equal bodies, also in copies of a scene, share their tables, which must not be changed."""
-    found = level.tables(model, wheels)
-    _drop_rounding(found.mff, len(model.mass))
-    return found
+    tables = level.tables(model, wheels)
+    _drop_rounding(tables.mff, len(model.mass))
+    return tables
 
 
 def _drop_rounding(masses: a.Real, points: int) -> None:

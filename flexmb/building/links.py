@@ -169,8 +169,8 @@ def links(scene: s.Scene, like: s.Scene | None = None) -> list[BodyLink]:
     NotImplementedError for SID bodies.
     """
     models = Models(scene, like)
-    followed = {} if like is None else {each.name: each for each in (*like.hinges, *like.point_masses)}
-    found = []
+    followed = {} if like is None else {item.name: item for item in (*like.hinges, *like.point_masses)}
+    links = []
     for body, hinge in ordered(scene):
         kind, axes = _kind(hinge, followed.get(hinge.name))
         inboard = End(hinge.parent_node, hinge.parent_position_m, hinge.parent_quaternion)
@@ -178,8 +178,8 @@ def links(scene: s.Scene, like: s.Scene | None = None) -> list[BodyLink]:
         level, parent = level_of(body), hinge.parent
         if isinstance(body, s.SidBody):
             models[body.name]  # raises the NotImplementedError
-        found.append(BodyLink(body.name, hinge, parent, level, kind, axes, inboard, outboard, body, models))
-    return found + [_point_mass(mass, models, followed.get(mass.name)) for mass in scene.point_masses]
+        links.append(BodyLink(body.name, hinge, parent, level, kind, axes, inboard, outboard, body, models))
+    return links + [_point_mass(mass, models, followed.get(mass.name)) for mass in scene.point_masses]
 
 
 def _kind(item: s.Hinge | s.PointMass, like: s.Hinge | s.PointMass | None) -> tuple[HingeKind, Reduced]:
@@ -221,7 +221,7 @@ class Side:
 def sides_of_closures(scene: s.Scene, like: s.Scene | None = None) -> list[tuple[s.Closure, tuple[Side, Side]]]:
     """The closures of a scene, each with its frames A and B. `like`: see `links`."""
     followed = [None] * len(scene.closures) if like is None else [closure.axis for closure in like.closures]
-    return [(each, closure_sides(each, axis)) for each, axis in zip(scene.closures, followed, strict=True)]
+    return [(closure, closure_sides(closure, axis)) for closure, axis in zip(scene.closures, followed, strict=True)]
 
 
 def closure_sides(closure: s.Closure, like: s.Vector | None = None) -> tuple[Side, Side]:

@@ -96,10 +96,10 @@ def _at(frame: NodeFrame) -> FlexibleNode:
 
 def wheels_by_body(scene: s.Scene) -> dict[str, list[s.Wheel]]:
     """Wheels of every body that has some, in the scene's order."""
-    found: dict[str, list[s.Wheel]] = {}
+    wheels: dict[str, list[s.Wheel]] = {}
     for wheel in scene.wheels:
-        found.setdefault(wheel.body, []).append(wheel)
-    return found
+        wheels.setdefault(wheel.body, []).append(wheel)
+    return wheels
 
 
 def level_of(body: s.Body) -> FidelityLevel:

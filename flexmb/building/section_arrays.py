@@ -32,7 +32,7 @@ def section_arrays(
         field = None if link.is_rigid else link.model.field
         if field is None:
             continue
-        port_section[own_ports] = [each.node.section for each in ports[k]]
+        port_section[own_ports] = [port.node.section for port in ports[k]]
         own_points = slice(body["point_start"][k], body["point_stop"][k])
         number = _kept(field, np.concatenate([point_section[own_points], port_section[own_ports]]))
         table, weight, own_rows = _tables(field, number, count, body[k : k + 1], m)

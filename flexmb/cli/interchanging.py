@@ -87,7 +87,7 @@ def export(
         check_and_warn(loaded)
         check_folder(out.parent)
         flexible = {
-            each.name: each for each in with_sid_bodies(loaded).bodies if isinstance(each, BeamBody | ModalBody)
+            body.name: body for body in with_sid_bodies(loaded).bodies if isinstance(body, BeamBody | ModalBody)
         }
         if body not in flexible:
             raise ValueError(f'"{body}" is not a flexible body of the scene: {closest(body, flexible)}')
@@ -153,9 +153,13 @@ def reduce(
             structure, interface_of(structure, chosen, ties), modes, name=out.stem,
             boundary="free-free" if free else "clamped-free", damping_ratio=damping, attached=further,
         )  # fmt: skip
-        centre, moments = (" ".join(f"{each:.6g}" for each in row) for row in (made.centre, np.diag(made.inertia)))
+        centre, moments = (
+            " ".join(f"{component:.6g}" for component in row) for row in (made.centre, np.diag(made.inertia))
+        )
         console.print(f"mass {made.mass:.6g} kg, centre {centre} m, moments of inertia {moments} kg m²")
-        console.print("frequencies", " ".join(f"{each:.6g}" for each in made.frequencies), "Hz", soft_wrap=True)
+        console.print(
+            "frequencies", " ".join(f"{frequency:.6g}" for frequency in made.frequencies), "Hz", soft_wrap=True
+        )
         console.print("mode  given Hz      reduced Hz    off       MAC", soft_wrap=True)
         for number, (own, given, mac) in enumerate(zip(*compared(structure, made, SHOWN), strict=True), 1):
             row = f"{number:4d}  {given:<12.6g}  {own:<12.6g}  {own / given - 1.0:<8.1g}  {mac:.4f}"

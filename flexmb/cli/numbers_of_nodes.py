@@ -12,7 +12,7 @@ MANY = 8_000  # nodes in a range: more than a structure can have
 
 def numbers_of(option: str, words: str) -> list[int]:
     """Numbers of nodes; ValueError, which names the option."""
-    found = list[int]()
+    numbers = list[int]()
     for word in words.split(","):
         first, to, last = word.partition("-")
         try:
@@ -21,8 +21,8 @@ def numbers_of(option: str, words: str) -> list[int]:
             raise ValueError(f"{option} is numbers of nodes such as 1,12 or 1-20; got {words!r}") from None
         if not 0 <= stop - start < MANY:
             raise ValueError(f"{option}: {word} is not a range of at most {MANY} nodes, from the lower to the higher")
-        found += range(start, stop + 1)
-    return found
+        numbers += range(start, stop + 1)
+    return numbers
 
 
 def tie_of(kind: Literal["rigid", "mean"], words: str) -> Tie:

@@ -60,7 +60,7 @@ def _table(scene: str, rows: list[tuple[str, MassProperties]]) -> Listing:
 
 def _numbers(values: Iterable[float]) -> str:
     """Numbers with six digits; those that are rounding errors of the largest are printed as zero."""
-    found = [float(value) for value in values]
-    largest = max(map(abs, found))
-    kept = [0.0 if abs(value) < 1e-14 * largest else value for value in found]
+    numbers = [float(value) for value in values]
+    largest = max(map(abs, numbers))
+    kept = [0.0 if abs(value) < 1e-14 * largest else value for value in numbers]
     return ", ".join(f"{value:.6g}" for value in kept)

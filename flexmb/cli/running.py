@@ -137,10 +137,10 @@ def _find_envelope(trajectory: Trajectory, path: Path) -> None:
     from flexmb.run.summary import peaks_table
 
     with console.status(Text("following the run over all of its steps")):
-        found = trajectory.envelope
-    console.print(peaks_table(trajectory, found))
+        envelope = trajectory.envelope
+    console.print(peaks_table(trajectory, envelope))
     with whole_file(path) as beside:
-        found.to_csv(beside)
+        envelope.to_csv(beside)
     console.print("wrote", str(path), soft_wrap=True)
 
 

@@ -85,7 +85,7 @@ def _as_asked(
             if opening(closures).beside(first) > NEARLY_CLOSED:
                 continue
         if wishes.insisted and asked.is_marked and not is_wished:
-            names = ", ".join(f'"{asked.name(each)}"' for each in wishes.insisted)
+            names = ", ".join(f'"{asked.name(wish)}"' for wish in wishes.insisted)
             raise ClosureError(
                 f"marked as given, but closures do not allow these values: {names}. Correct them, or remove the mark "
                 "of one, which then follows from the others"
@@ -105,10 +105,10 @@ def _holds(wishes: Wishes, asked: AskedFor) -> Iterator[tuple[KeptValues, bool]]
 def _unless_turned(closures: Closures, t: float, y: Real, hold: KeptValues, closing: Closing) -> Real | None:
     """The result of `closing`, None where there is none or closed axes are opposite."""
     try:
-        found = closing(closures, t, y, hold)
+        closed = closing(closures, t, y, hold)
     except ClosureError:
         return None
-    return None if closures.half_turned() else found
+    return None if closures.half_turned() else closed
 
 
 def _closed(closures: Closures, t: float, y: Real, hold: KeptValues) -> Real:
@@ -116,9 +116,9 @@ def _closed(closures: Closures, t: float, y: Real, hold: KeptValues) -> Real:
     start, y = y, _gap_closed(closures, t, y, hold)
     energy = _strain(closures, y - start)
     for _ in range(RELAXATIONS if energy > 0.0 else 0):
-        found = decomposed(closures, t, y, hold)
-        assert isinstance(found, Weighed)  # there are strains
-        further = _moved(closures, t, y, -found.relaxing(closures.errors(), y - start), hold)
+        closed = decomposed(closures, t, y, hold)
+        assert isinstance(closed, Weighed)  # there are strains
+        further = _moved(closures, t, y, -closed.relaxing(closures.errors(), y - start), hold)
         try:
             further = _gap_closed(closures, t, further, hold)
         except (ClosureError, DynamicsError):
@@ -140,11 +140,11 @@ def _gap_closed(closures: Closures, t: float, y: Real, hold: KeptValues) -> Real
     for _ in range(STEPS):
         if _largest(closures.errors()) <= CLOSED or damping > STRONGEST:
             break
-        found = decomposed(closures, t, y, hold, sizes)
+        closed = decomposed(closures, t, y, hold, sizes)
         # The damping decreases with the errors, so that convergence is quadratic, also where rows become dependent.
         fading = damping * min(1.0, float(np.linalg.norm(errors)))
-        floor = fading * found.largest**2 + np.finfo(float).tiny
-        trial = _moved(closures, t, y, -found.damped(errors, floor), hold)
+        floor = fading * closed.largest**2 + np.finfo(float).tiny
+        trial = _moved(closures, t, y, -closed.damped(errors, floor), hold)
         smaller = np.linalg.norm(closures.errors(sizes)) < np.linalg.norm(errors)
         if smaller and _has_dynamics(closures, t, trial):
             y, errors, damping = trial, closures.errors(sizes), damping / 10.0
@@ -179,7 +179,7 @@ def _has_dynamics(closures: Closures, t: float, y: Real) -> bool:
 
 def _strain(closures: Closures, change: Real) -> float:
     """Of a change of [q, u, work]: the strain energy, up to a factor."""
-    return float(sum(eta @ each.weight @ eta for each in closures.strains for eta in [change[each.coordinates]]))
+    return float(sum(eta @ strain.weight @ eta for strain in closures.strains for eta in [change[strain.coordinates]]))
 
 
 def _moving(closures: Closures, t: float, y: Real, hold: KeptValues) -> Real:
@@ -191,8 +191,8 @@ def _moving(closures: Closures, t: float, y: Real, hold: KeptValues) -> Real:
     for _ in range(3):
         if largest <= CLOSED:
             break
-        found = decomposed(closures, t, y, hold)
-        y = closures.pushed(t, y, -found.damped(rates, 0.0))
+        closed = decomposed(closures, t, y, hold)
+        y = closures.pushed(t, y, -closed.damped(rates, 0.0))
         y[hold.speeds] = start[hold.speeds]
         rates, largest = closures.rates()
     if not (largest <= MOVING_APART or _largest(rates) <= NEARLY_CLOSED * taken):  # the second where it is at rest
@@ -236,8 +236,8 @@ class Decomposed(NamedTuple):
             root = [np.sqrt(group.s[k] ** 2 + floor) for group, k in zip(groups, kept, strict=True)]
             T = [group.shared[k] / r[:, None] for group, k, r in zip(groups, kept, root, strict=True)]
             z = [group.U[:, k].T @ values[group.of.rows] / r for group, k, r in zip(groups, kept, root, strict=True)]
-            C = np.eye(T[0].shape[1]) + sum(each.T @ each for each in T)
-            y = np.linalg.solve(C, sum(each.T @ part for each, part in zip(T, z, strict=True)))
+            C = np.eye(T[0].shape[1]) + sum(block.T @ block for block in T)
+            y = np.linalg.solve(C, sum(block.T @ part for block, part in zip(T, z, strict=True)))
             for group, k, r, t, part in zip(groups, kept, root, T, z, strict=True):
                 f = (part - t @ y) / r
                 x[group.of.columns[: group.of.own]] += group.Vt[k].T @ (group.s[k] * f)
@@ -276,8 +276,8 @@ class Weighed(NamedTuple):
     def _damped(self, values: Real, floor: float) -> Real:
         kept = self.s > (0.0 if floor > 0.0 else self.least)
         s = self.s[kept]
-        found: Real = self.Vt[kept].T @ (s / (s * s + floor) * (self.U[:, kept].T @ values))
-        return found
+        step: Real = self.Vt[kept].T @ (s / (s * s + floor) * (self.U[:, kept].T @ values))
+        return step
 
 
 def decomposed(
@@ -288,7 +288,7 @@ def decomposed(
     if not len(hold.fixed) and not closures.strains:
         return Decomposed(speeds, [[_decomposed(of) for of in groups] for groups in responses])
     half = np.zeros((sum(len(of.half) for groups in responses for of in groups), speeds))
-    for of in (each for groups in responses for each in groups):
+    for of in (group for groups in responses for group in groups):
         half[of.rows, of.columns] = of.half
     moving = closures.moving(t, y)
     Z = np.linalg.qr(moving[hold.fixed].T, mode="complete")[0][:, len(hold.fixed) :]

@@ -64,8 +64,8 @@ class Spread(NamedTuple):
 
     def leaves_open(self, changes: Real) -> NDArray[np.bool_]:
         """Which components are not determined by the motion, from their changes (k,...)."""
-        found: NDArray[np.bool_] = np.any(np.abs(changes) > self.rounding, axis=0)
-        return found
+        is_open: NDArray[np.bool_] = np.any(np.abs(changes) > self.rounding, axis=0)
+        return is_open
 
 
 class ClosedMotion(NamedTuple):
@@ -141,9 +141,9 @@ class Closures:
 
     def for_thread(self, like: Closures | None = None) -> Closures:
         """The same closures with workspaces of their own, or of `like`; the count of independent rows is shared."""
-        found = self.on_tree(self.constants[0], self._tree, like)
-        found._counted = self._counted
-        return found
+        closures = self.on_tree(self.constants[0], self._tree, like)
+        closures._counted = self._counted
+        return closures
 
     @property
     def row_loads(self) -> Real:
@@ -241,7 +241,7 @@ class Closures:
         if not null.shape[1]:
             return self._under(s, least)
         size = max(1.0, float(np.max(np.abs(least))))
-        others = [self._under_anew(t, y, s, least + size * each) for each in null.T]
+        others = [self._under_anew(t, y, s, least + size * direction) for direction in null.T]
         motion = self._under_anew(t, y, s, least)
         return motion._replace(
             spread=Spread(
@@ -300,12 +300,12 @@ class Closures:
         """
         cc, own = self.constants[1], self._own
         scale = self._scale("size", largest)
-        found = []
+        responses = []
         for group in blocks(cc, own):
             left = np.linalg.norm(group.half[:, : group.own], axis=1)
             felt = cc.weight[group.rows] * left > DEPENDENT * own.size[group.rows]
-            found.append(group._replace(half=(scale[group.rows] * felt)[:, None] * group.half))
-        return [found[cluster["group_start"] : cluster["group_stop"]] for cluster in cc.cluster]
+            responses.append(group._replace(half=(scale[group.rows] * felt)[:, None] * group.half))
+        return [responses[cluster["group_start"] : cluster["group_stop"]] for cluster in cc.cluster]
 
     def errors(self, largest: Real | float = np.inf) -> Real:
         """Values of the rows (G,) relative to the size of their closures; `largest` as for `responses`."""
@@ -450,10 +450,10 @@ class Closures:
         return self._null_loads(self._chain)
 
     def _null_loads(self, s: Closed) -> Real:
-        found = null_loads(s.cc, s.cw)
-        out = np.zeros((len(s.cw.row), sum(null.shape[1] for _, null in found)))
+        loads = null_loads(s.cc, s.cw)
+        out = np.zeros((len(s.cw.row), sum(null.shape[1] for _, null in loads)))
         first = 0
-        for rows, null in found:
+        for rows, null in loads:
             out[rows, first : first + null.shape[1]] = null
             first += null.shape[1]
         return out

@@ -55,12 +55,14 @@ def closure_constants(
     for i in range(len(scene.closures), len(closures)):
         bodies = terms["body"][closures["term_start"][i] : closures["term_stop"][i]].tolist()
         paths.append(path_of_coupling(parent, bodies))
-    closures["path_stop"] = np.cumsum([len(each.bodies) for each in paths])
-    closures["path_start"] = closures["path_stop"] - [len(each.bodies) for each in paths]
-    own = [_rows(scene, i, each) for i, each in enumerate(scene.constraints)]
+    closures["path_stop"] = np.cumsum([len(path.bodies) for path in paths])
+    closures["path_start"] = closures["path_stop"] - [len(path.bodies) for path in paths]
+    own = [_rows(scene, i, constraint) for i, constraint in enumerate(scene.constraints)]
     members = clusters(constants, paths)
     rows: list[tuple[int, int, int]] = []
-    for group, i in ((number, i) for number, each in enumerate(itertools.chain(*members)) for i in each):
+    for group, i in (
+        (number, i) for number, members_of_group in enumerate(itertools.chain(*members)) for i in members_of_group
+    ):
         closures["group"][i], closures["row_start"][i] = group, len(rows)
         rows += own[i]
         closures["row_stop"][i] = len(rows)
@@ -72,7 +74,7 @@ def closure_constants(
         closure=closures,
         term=terms,
         row=row_table,
-        path=np.array([k for each in paths for k in each.bodies], np.int64),
+        path=np.array([k for path in paths for k in path.bodies], np.int64),
         group=tables.groups,
         column=tables.columns,
         cluster=tables.clusters,
@@ -88,10 +90,10 @@ def _terms(scene: s.Scene, constants: Constants, chain: list[BodyLink], closures
     rows: list[tuple[int, int, float, int, int]] = []
     for i, coupling in enumerate(scene.couplings, len(scene.closures)):
         closures["offset"][i], closures["term_start"][i] = coupling.offset, len(rows)
-        for each in coupled(scene, coupling):
-            k = held[each.hinge.name]
-            speed = int(constants.body["u_index"][k]) + each.place
-            rows.append((int(constants.speed["coordinate"][speed]), speed, each.factor, k, each.place))
+        for member in coupled(scene, coupling):
+            k = held[member.hinge.name]
+            speed = int(constants.body["u_index"][k]) + member.place
+            rows.append((int(constants.speed["coordinate"][speed]), speed, member.factor, k, member.place))
         closures["term_stop"][i] = len(rows)
     return np.array(rows, t.TERM)
 
@@ -109,13 +111,15 @@ def _rows(scene: s.Scene, i: int, closure: s.Closure | s.Coupling) -> list[tuple
 def _length(constants: Constants, sides: np.ndarray) -> float:
     """The largest distance of a frame from the one it is fixed to, on any body or the ground (m); 1 where all are 0."""
     points = [constants.port["position"] + constants.port["offset"], constants.body["placement_position"]]
-    largest = max(float(np.max(np.linalg.norm(each, axis=-1), initial=0.0)) for each in (*points, sides["position"]))
+    largest = max(
+        float(np.max(np.linalg.norm(positions, axis=-1), initial=0.0)) for positions in (*points, sides["position"])
+    )
     return largest or 1.0
 
 
 def slowest_mode(chain: list[BodyLink]) -> float:
     """The lowest uncoupled modal frequency (rad/s), body held; infinite where no mode has stiffness."""
-    found = [np.inf]
+    slowest = [np.inf]
     for link in chain:
         if link.mode_count == 0:
             continue
@@ -124,5 +128,5 @@ def slowest_mode(chain: list[BodyLink]) -> float:
         mass += np.einsum("pan,pab,pbn->n", m.rotation, m.inertia, m.rotation)
         stiffness = np.diag(m.stiffness)
         moving = (stiffness > 0.0) & (mass > 0.0)
-        found += np.sqrt(stiffness[moving] / mass[moving]).tolist()
-    return min(found)
+        slowest += np.sqrt(stiffness[moving] / mass[moving]).tolist()
+    return min(slowest)

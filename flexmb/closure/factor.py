@@ -81,10 +81,10 @@ def _choose(cc, cw, g, wanted):
         cw.chosen[r] = r
     for j in range(cc.group[g].half, cc.group[g].half + (stop - first) * columns(cc, g)):
         cw.basis[j] = cw.half[j]  # before the pivoting, rows have the order of `half`
-    found = 0
-    while first + found < stop and found != wanted:
+    chosen = 0
+    while first + chosen < stop and chosen != wanted:
         best, at = DEPENDENT, -1
-        for place in range(first + found, stop):
+        for place in range(first + chosen, stop):
             r = cw.chosen[place]
             if cw.size[r] > 0.0:  # ports that cannot move have rows of zeros
                 left = cc.weight[r] * norm(cw.basis, row_place(cc, g, r), own) / cw.size[r]
@@ -92,13 +92,13 @@ def _choose(cc, cw, g, wanted):
                     best, at = left, place
         if at < 0:
             break
-        cw.chosen[first + found], cw.chosen[at] = cw.chosen[at], cw.chosen[first + found]
-        along = row_place(cc, g, cw.chosen[first + found])
+        cw.chosen[first + chosen], cw.chosen[at] = cw.chosen[at], cw.chosen[first + chosen]
+        along = row_place(cc, g, cw.chosen[first + chosen])
         length = norm(cw.basis, along, own)
-        for place in range(first + found + 1, stop):
+        for place in range(first + chosen + 1, stop):
             _orthogonalise(cw.basis, row_place(cc, g, cw.chosen[place]), along, (own, own), length * length)
-        found += 1
-    return found
+        chosen += 1
+    return chosen
 
 
 @helper

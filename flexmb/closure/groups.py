@@ -52,25 +52,25 @@ def path_of_coupling(parent: Sequence[int], bodies: Sequence[int]) -> LoadPath:
     Carriers are the bodies that carry all of these hinges: their motion does not change the coordinates.
     """
     held = [_ancestors(parent, k) for k in bodies]
-    carriers = frozenset.intersection(*(frozenset(each - {k}) for each, k in zip(held, bodies, strict=True)))
+    carriers = frozenset.intersection(*(frozenset(path - {k}) for path, k in zip(held, bodies, strict=True)))
     return LoadPath(frozenset(_union(held)) - carriers, carriers)
 
 
 def _ancestors(parent: Sequence[int], k: int) -> set[int]:
     """A body and all bodies that carry it; bodies are numbered from the ground outward."""
-    found = set()
+    ancestors = set()
     while k >= 0:
-        found.add(k)
+        ancestors.add(k)
         k = parent[k]
-    return found
+    return ancestors
 
 
 def clusters(c: Constants, paths: Sequence[LoadPath]) -> list[list[list[int]]]:
     """Closures by group, groups by cluster; clusters, and groups in each, in the order of their first closure."""
     moves = _moves(c)
-    mine = [{k for k in each.own if moves[k]} for each in paths]
+    mine = [{k for k in path.own if moves[k]} for path in paths]
     owned = set().union(*mine)
-    felt = [own | (each.carriers & owned) for own, each in zip(mine, paths, strict=True)]
+    felt = [own | (body.carriers & owned) for own, body in zip(mine, paths, strict=True)]
     grouped = _joined(felt)
     carriers = [{k for i in group for k in paths[i].carriers if moves[k]} - owned for group in grouped]
     return [[grouped[g] for g in cluster] for cluster in _joined(carriers)]
@@ -90,10 +90,10 @@ def _joined(bodies: Sequence[Iterable[int]]) -> list[list[int]]:
         for k in own:
             one, other = sorted((leader_of(first.setdefault(k, i)), leader_of(i)))
             leader[other] = one
-    found: dict[int, list[int]] = {}
+    groups: dict[int, list[int]] = {}
     for i in range(len(bodies)):
-        found.setdefault(leader_of(i), []).append(i)
-    return list(found.values())
+        groups.setdefault(leader_of(i), []).append(i)
+    return list(groups.values())
 
 
 class GroupTables(NamedTuple):
@@ -140,15 +140,15 @@ def _moves(c: Constants) -> list[bool]:
     """Whether each body has a free speed: an unprescribed one of its hinge, or that of a mode."""
     free = np.append(0, np.cumsum(c.speed["prescribed"] < 0))
     first = c.body["u_index"]
-    found: list[bool] = ((free[first + c.body["nv"]] > free[first]) | (c.body["modes"] > 0)).tolist()
-    return found
+    flags: list[bool] = ((free[first + c.body["nv"]] > free[first]) | (c.body["modes"] > 0)).tolist()
+    return flags
 
 
 def _speeds(c: Constants, bodies: Sequence[int]) -> list[int]:
     """Indices of all speeds of these bodies: of hinge, modes and wheels."""
-    found = list[int]()
+    speeds = list[int]()
     for body in c.body[list(bodies)]:
         for first, count in (("u_index", "nv"), ("etad_index", "modes")):
-            found += range(body[first], body[first] + body[count])
-        found += c.wheel["u_index"][body["wheel_start"] : body["wheel_stop"]].tolist()
-    return found
+            speeds += range(body[first], body[first] + body[count])
+        speeds += c.wheel["u_index"][body["wheel_start"] : body["wheel_stop"]].tolist()
+    return speeds

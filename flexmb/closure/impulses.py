@@ -34,12 +34,12 @@ class RowMotion:
 
     def wrenches(self, impulses: Real) -> Real:
         """(C,6) [N m s; N s] on body_b about frame B, World axes, of the impulses (G,) of the rows."""
-        found = np.zeros((len(self._world), 6))
+        wrenches = np.zeros((len(self._world), 6))
         along = impulses[:, None] * self._row["direction"]
         for i, kind, part in zip(self._own.row["closure"], self._own.row["type"], along, strict=True):
             first = 0 if kind == ROTATION else 3
-            found[i, first : first + 3] += self._world[i] @ part
-        return found
+            wrenches[i, first : first + 3] += self._world[i] @ part
+        return wrenches
 
 
 def _without_prescribed(c: Constants) -> Constants:

@@ -253,8 +253,8 @@ def _same_branch(h, cc, cw):
                     return False
             else:
                 expected = cw.former_pivot[place] * (h - ahead) / ahead
-                found = cw.factor[entry(cc, g, a, a)]
-                if not (-turned >= TURNED and 0.5 * expected <= found <= 2.0 * expected):
+                factor = cw.factor[entry(cc, g, a, a)]
+                if not (-turned >= TURNED and 0.5 * expected <= factor <= 2.0 * expected):
                     return False
                 closure = cw.closure[cc.row[r].closure]
                 least = min(abs(cw.demand[0, place]), abs(cw.demand[3, place]))

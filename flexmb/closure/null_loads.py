@@ -32,9 +32,9 @@ def blocks(cc: ClosureConstants, cw: ClosureWorkspace) -> Iterator[GroupResponse
 
 def null_loads(cc: ClosureConstants, cw: ClosureWorkspace) -> list[tuple[slice, Real]]:
     """Slice of the rows and orthonormal null loads (rows,k), for each group that has null loads."""
-    found: list[tuple[slice, Real]] = []
+    loads: list[tuple[slice, Real]] = []
     if np.array_equal(cw.rank, cc.group["row_stop"] - cc.group["row_start"]):
-        return found
+        return loads
     for (rows, _, whole, own), rank in zip(blocks(cc, cw), cw.rank.tolist(), strict=True):
         half = whole[:, :own]
         if rank < len(half):
@@ -43,5 +43,5 @@ def null_loads(cc: ClosureConstants, cw: ClosureWorkspace) -> list[tuple[slice, 
             null = np.zeros((len(half), len(rest)))
             null[rest] = np.eye(len(rest))
             null[chosen] = -np.linalg.lstsq(half[chosen].T, half[rest].T, rcond=None)[0]
-            found.append((rows, np.linalg.qr(null)[0]))
-    return found
+            loads.append((rows, np.linalg.qr(null)[0]))
+    return loads

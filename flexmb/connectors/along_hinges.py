@@ -58,10 +58,10 @@ def _spring(c, w, i):
 @helper
 def _law(c, w, i):
     j, kind = c.coordinate_law[i].speed, c.coordinate_law[i].kind
-    found = catalogue.load(c, kind, c.coordinate_law[i].parameters, w.q[c.speed[j].coordinate], w.u[j])
-    w.coordinate_law[i].load = found[0]
-    w.coordinate_law[i].energy = found[1]
-    w.coordinate_law[i].power = found[2]
+    load = catalogue.load(c, kind, c.coordinate_law[i].parameters, w.q[c.speed[j].coordinate], w.u[j])
+    w.coordinate_law[i].load = load[0]
+    w.coordinate_law[i].energy = load[1]
+    w.coordinate_law[i].power = load[2]
 
 
 @helper

@@ -43,15 +43,17 @@ class CoordinateLaw:
         twin = Interpreter(_Differentiated)(self.load)
         for q, v in _TRIED:
             try:
-                found = twin((1.0,) * MOST, _Differentiated(q), _Differentiated(v))
+                coordinate_twin = twin((1.0,) * MOST, _Differentiated(q), _Differentiated(v))
             except LawError as error:
                 at = traceback.extract_tb(error.__traceback__)
-                place = next(each for each in reversed(at) if each.filename != __file__)
+                place = next(frame for frame in reversed(at) if frame.filename != __file__)
                 where = f"{place.filename}, line {place.lineno}: {place.line}"
                 raise LawError(f'law "{self.name}": {error}\n  {where}') from None
-            if not (isinstance(found, tuple) and len(found) == 3):
-                raise LawError(f'law "{self.name}" returns {found!r}: return the load, the energy and the power')
-            for what, number in zip(("load", "energy", "power"), found, strict=True):
+            if not (isinstance(coordinate_twin, tuple) and len(coordinate_twin) == 3):
+                raise LawError(
+                    f'law "{self.name}" returns {coordinate_twin!r}: return the load, the energy and the power'
+                )
+            for what, number in zip(("load", "energy", "power"), coordinate_twin, strict=True):
                 if not isinstance(number, _Differentiated):
                     remedy = "take functions from flexmb.spatial.scalar, and 0.0 * v where there is none"
                     raise LawError(f'law "{self.name}": its {what} has lost the derivatives: {remedy}')

@@ -39,11 +39,11 @@ class Feedback(LoopRun):
     def signals(self, begin: Starting) -> Real:
         """(S,) signals at one state, before the sampled controllers that are due there act."""
         y = self.only_at(begin)
-        found = np.zeros(len(self.running.signal))
+        signals = np.zeros(len(self.running.signal))
         loop.project(begin.state.t, y.copy(), self.running)
-        loop.look(begin.state.t, y, found, self.running)
+        loop.look(begin.state.t, y, signals, self.running)
         self.raise_trouble()
-        return found
+        return signals
 
     def signal_rates(self, begin: Starting) -> Real:
         """(S,) rates (1/s) of the signals that are not sampled, by a finite difference; 0 at rest."""
@@ -104,6 +104,6 @@ class Feedback(LoopRun):
 
     def rates_of_time(self, t: float) -> Real:
         """(S,) how the signals of sensors change with time at a state that is held."""
-        found = np.zeros(int(np.sum(self._wiring.sensor["width"])))
-        sensors_by_time(t, self.running, found)
-        return found
+        rates_of_time = np.zeros(int(np.sum(self._wiring.sensor["width"])))
+        sensors_by_time(t, self.running, rates_of_time)
+        return rates_of_time

@@ -48,21 +48,21 @@ def law_derivatives(feedback: Feedback, t: float, y: Real, one_sided: bool = Fal
     if not one_sided:
         _refuse_corners(feedback)
     sensors, states = int(np.sum(made.sensor["width"])), np.array(feedback.continuous_states, np.int64)
-    found = _by_duals(feedback, t, sensors, states)
-    called = any(isinstance(each, UserLaw) for each in feedback.controllers)
+    derivatives = _by_duals(feedback, t, sensors, states)
+    called = any(isinstance(controller, UserLaw) for controller in feedback.controllers)
     by_time = _by_time(feedback, t, values) if called else np.zeros(len(values))
     _raise(feedback, loop.look(t, y, made.signal.copy(), made))  # leaves drives and outputs as they are at t
-    _refuse_open(feedback, np.column_stack([found, by_time]))
-    return LawDerivatives(values, found[:, :sensors], found[:, sensors:], by_time)
+    _refuse_open(feedback, np.column_stack([derivatives, by_time]))
+    return LawDerivatives(values, derivatives[:, :sensors], derivatives[:, sensors:], by_time)
 
 
 def _by_duals(feedback: Feedback, t: float, sensors: int, states: Index) -> Real:
     """(D+X,S+X), eight columns at a time."""
     made = feedback.running
     arrays = {
-        each.name: as_duals(getattr(made, each.name))
-        for each in fields(LoopVariation)
-        if each.name not in ("plain", "address")
+        field.name: as_duals(getattr(made, field.name))
+        for field in fields(LoopVariation)
+        if field.name not in ("plain", "address")
     }
     dual = LoopVariation(plain=plain_laws(made), address=np.zeros(ADDRESSES, np.int64), **arrays)
     read = [(dual.signal, i) for i in range(sensors)] + [(dual.state, int(i)) for i in states]

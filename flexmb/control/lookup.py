@@ -39,7 +39,7 @@ def fault(module: str, name: str, arguments: int, depth: int = 0) -> str | None:
         case ast.Import() if not inner:
             return "it is a module"
         case ast.ImportFrom(module=str(other), level=0) if len(bindings) == 1 and depth < DEEPEST:
-            true = next(each.name for each in last.names if (each.asname or each.name) == first)
+            true = next(name.name for name in last.names if (name.asname or name.name) == first)
             return None if inner else fault(other, true, arguments, depth + 1)
     return None
 
@@ -79,7 +79,7 @@ def _parsed(spec: ModuleSpec) -> ast.Module | None:
 def _makes_names(tree: ast.Module) -> bool:
     """Whether names may be bound dynamically: `from m import *`, `__getattr__`, `globals()`."""
     for node in ast.walk(tree):
-        if isinstance(node, ast.ImportFrom) and any(each.name == "*" for each in node.names):
+        if isinstance(node, ast.ImportFrom) and any(name.name == "*" for name in node.names):
             return True
         if isinstance(node, ast.FunctionDef) and node.name == "__getattr__":
             return True
@@ -97,7 +97,7 @@ def _bindings(body: Sequence[ast.stmt], name: str) -> Iterator[ast.stmt]:
                     yield statement
                 continue
             case ast.Import() | ast.ImportFrom():
-                if any((each.asname or each.name.partition(".")[0]) == name for each in statement.names):
+                if any((alias.asname or alias.name.partition(".")[0]) == name for alias in statement.names):
                     yield statement
                 continue
         inner = [block for key in ("body", "orelse", "finalbody") for block in getattr(statement, key, ())]
@@ -114,7 +114,7 @@ def _binds(node: ast.AST, name: str) -> bool:
 
 def _replaced(function: ast.FunctionDef) -> bool:
     """Whether a decorator may replace the function; flexmb's own decorator keeps the arguments."""
-    names = {ast.unparse(each).rpartition(".")[2] for each in function.decorator_list}
+    names = {ast.unparse(decorator).rpartition(".")[2] for decorator in function.decorator_list}
     return bool(names - {"user_function"})
 
 

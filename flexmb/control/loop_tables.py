@@ -71,14 +71,14 @@ class LoopTables:
 
     def heed(self, stop: Index) -> None:
         """Let an exception in a Python law end the run, by stop[0] = 1."""
-        for each in self._called:
-            each.stop = stop
+        for function in self._called:
+            function.stop = stop
 
     def raise_trouble(self) -> None:
         """Raise the original exception of a Python law again."""
-        for each in self._called:
-            if each.trouble is not None:
-                trouble, each.trouble = each.trouble, None
+        for function in self._called:
+            if function.trouble is not None:
+                trouble, function.trouble = function.trouble, None
                 raise trouble
 
     @property
@@ -109,8 +109,8 @@ class LoopTables:
     @property
     def driven(self) -> list[int]:
         """Indices of the functions of time that controllers drive."""
-        found: list[int] = self._wiring.drive["function"].tolist()
-        return found
+        functions: list[int] = self._wiring.drive["function"].tolist()
+        return functions
 
     @property
     def state_names(self) -> list[str]:
@@ -127,7 +127,7 @@ class LoopTables:
     def sampled_widths(self) -> dict[str, int]:
         """Numbers of outputs of the sampled controllers, by name."""
         rows = zip(self.controllers, self._wiring.controller, strict=True)
-        return {each.name: int(row["outputs"]) for each, row in rows if row["sampled"]}
+        return {controller.name: int(row["outputs"]) for controller, row in rows if row["sampled"]}
 
     @property
     def running(self) -> a.Loop:
@@ -153,9 +153,9 @@ class LoopTables:
             self._plant.observe_row(t, self.running.y.copy(), self._algorithm.name, row[0])
         except DynamicsError:
             row[:] = np.nan
-        found = observation.columns_of(row)
-        self._loads[:] = np.concatenate([found["loads"][0], found["closures"][0]])
-        self._drives[:] = found["drives"][0]
+        columns = observation.columns_of(row)
+        self._loads[:] = np.concatenate([columns["loads"][0], columns["closures"][0]])
+        self._drives[:] = columns["drives"][0]
 
     def _buffers(self) -> dict[str, Real]:
         """The arrays that laws read and write; their addresses do not change during a run."""

@@ -78,26 +78,26 @@ def wired(system: System) -> Wiring:
     number, initial = list[float](), list[float]()
     follows, continuous, outputs = False, list[float](), 0
     plain: dict[int, Callable[..., None]] = {}
-    for i, (row, each) in enumerate(zip(record, scene.controllers, strict=True)):
-        inputs = [n for reference in each.inputs for n in numbers_of(names, reference)]
-        width = output_width(each, len(inputs)) or 0
+    for i, (row, controller) in enumerate(zip(record, scene.controllers, strict=True)):
+        inputs = [n for reference in controller.inputs for n in numbers_of(names, reference)]
+        width = output_width(controller, len(inputs)) or 0
         first = max((place.stop for place in names.values()), default=0)
-        names[each.name] = slice(first, first + width)
-        states, numbers = _states(each), _numbers(each, len(inputs))
-        row["sampled"] = each.period_s is not None
+        names[controller.name] = slice(first, first + width)
+        states, numbers = _states(controller), _numbers(controller, len(inputs))
+        row["sampled"] = controller.period_s is not None
         row["signal"], row["x"] = first, len(continuous)
         row["input"], row["inputs"], row["state"], row["states"] = len(wire), len(inputs), len(initial), len(states)
         row["output"], row["outputs"], row["number"], row["numbers"] = outputs, width, len(number), len(numbers)
-        if isinstance(each, UserLaw):
-            place = ROOT.key("controllers", i).named(label("controllers", each)).key("function")
-            law = found(each.function, called(scene), place)
+        if isinstance(controller, UserLaw):
+            place = ROOT.key("controllers", i).named(label("controllers", controller)).key("function")
+            law = found(controller.function, called(scene), place)
             if is_foreign(law):
                 row["law"], row["function"] = a.COMPILED, compiled_address(law, called(scene), place)
             else:
                 row["law"], plain[i] = a.CALLED, law
         else:
-            row["law"] = _LAWS[type(each)]
-        if each.period_s is None:
+            row["law"] = _LAWS[type(controller)]
+        if controller.period_s is None:
             continuous += states
             follows |= not immediate.isdisjoint(inputs)
         wire += inputs
@@ -134,7 +134,7 @@ def profile_tables(scene: Scene) -> tuple[Record, Real]:
 
 
 def _profiles(scene: Scene) -> list[Function]:
-    return [each.function for each in scene.sensors if isinstance(each, ProfileSensor)]
+    return [sensor.function for sensor in scene.sensors if isinstance(sensor, ProfileSensor)]
 
 
 def _sensor(system: System, sensor: Sensor) -> tuple[int, int, int, int]:
@@ -186,8 +186,10 @@ def numbers_of(names: dict[str, slice], reference: str) -> list[int]:
 
 def law_numbers(controllers: Sequence[Controller], inputs: Sequence[int]) -> tuple[Real, Real]:
     """The parameters of all controllers with so many inputs each, and the initial values of their states."""
-    numbers = [value for each, count in zip(controllers, inputs, strict=True) for value in _numbers(each, count)]
-    return np.array(numbers), np.array([value for each in controllers for value in _states(each)])
+    numbers = [
+        value for controller, count in zip(controllers, inputs, strict=True) for value in _numbers(controller, count)
+    ]
+    return np.array(numbers), np.array([value for controller in controllers for value in _states(controller)])
 
 
 def _states(controller: Controller) -> list[float]:
@@ -211,13 +213,18 @@ def _numbers(controller: Controller, inputs: int) -> list[float]:
         case StateSpace():
             return _matrices(controller, inputs).ravel().tolist()
         case Pid() as pid:
-            found = [0.0] * laws.PID_NUMBERS
-            found[laws.KP], found[laws.KI], found[laws.KD], found[laws.FILTER] = pid.kp, pid.ki, pid.kd, pid.filter_s
-            found[laws.LOWER] = -np.inf if pid.lower is None else pid.lower
-            found[laws.UPPER] = np.inf if pid.upper is None else pid.upper
-            found[laws.TRACKING], found[laws.SETPOINT] = _tracking(pid), pid.setpoint
-            found[laws.PERIOD] = pid.period_s or 0.0
-            return found
+            numbers = [0.0] * laws.PID_NUMBERS
+            numbers[laws.KP], numbers[laws.KI], numbers[laws.KD], numbers[laws.FILTER] = (
+                pid.kp,
+                pid.ki,
+                pid.kd,
+                pid.filter_s,
+            )
+            numbers[laws.LOWER] = -np.inf if pid.lower is None else pid.lower
+            numbers[laws.UPPER] = np.inf if pid.upper is None else pid.upper
+            numbers[laws.TRACKING], numbers[laws.SETPOINT] = _tracking(pid), pid.setpoint
+            numbers[laws.PERIOD] = pid.period_s or 0.0
+            return numbers
         case Saturation(lower=lower, upper=upper):
             return [lower, upper]
         case GainTable(points=points, values=values):
@@ -244,14 +251,13 @@ def _matrices(controller: StateSpace, inputs: int) -> Any:
     places = {"A": (0, 0, n), "B": (0, n, inputs), "C": (n, 0, n), "D": (n, n, inputs)}
     for key, (row, column, width) in places.items():
         matrix = getattr(controller, key)
-        if any(len(each) != width for each in matrix):
+        if any(len(row_of_matrix) != width for row_of_matrix in matrix):
             raise ValueError(f'controller "{controller.name}": {key} has {len(matrix[0])} columns, {width} are needed')
-        for i, each in enumerate(matrix):
-            block[row + i, column : column + width] = each
+        for i, row_of_matrix in enumerate(matrix):
+            block[row + i, column : column + width] = row_of_matrix
     return block
 
 
 def widest(record: Record) -> int:
     """The largest number of outputs of a controller."""
     return max(chain([1], record["outputs"].tolist()))
-

@@ -68,9 +68,9 @@ def suppressed(closure: s.Closure) -> tuple[list[tuple[Real, Real]], list[Real]]
 def relation(dense: DenseSystem, coupling: s.Coupling) -> tuple[Real, Real]:
     """(nq,) and (nu,) factors of coordinates and speeds in a coupling."""
     of_q, of_u = np.zeros(dense.nq), np.zeros(dense.nu)
-    for each in coupled(dense.scene, coupling):
-        at = [x for x in dense.tree.scalars if x.owner == each.hinge.name][each.place]
-        of_q[at.q] = of_u[at.u] = each.factor
+    for member in coupled(dense.scene, coupling):
+        at = [x for x in dense.tree.scalars if x.owner == member.hinge.name][member.place]
+        of_q[at.q] = of_u[at.u] = member.factor
     return of_q, of_u
 
 
@@ -82,15 +82,15 @@ def rows(dense: DenseSystem, closure: s.Closure | s.Coupling, motion: Motions) -
         return np.array([value, motion.u @ of_u, motion.rates @ of_u])[:, :, None]
     B = relative_frame(dense, closure, motion)
     turns, steps = suppressed(closure)
-    found = [
+    rows = [
         [np.einsum("i,bnij,j->b", a, part, b) for part in (B.rotation.value, B.rotation.rate, B.rotation.acceleration)]
         for a, b in turns
     ]
-    found += [
+    rows += [
         [part[:, 0] @ axis for part in (B.position.value, B.position.rate, B.position.acceleration)] for axis in steps
     ]
     count = len(motion.u)
-    return np.array([[np.broadcast_to(v, count) for v in row] for row in found]).transpose(1, 2, 0)
+    return np.array([[np.broadcast_to(v, count) for v in row] for row in rows]).transpose(1, 2, 0)
 
 
 def wrenches(dense: DenseSystem, q: Real) -> dict[str, Real]:
@@ -153,22 +153,24 @@ def open_loads(dense: DenseSystem, q: Real, held: NDArray[np.bool_]) -> OpenLoad
     """What null loads of the rows change at q (nq,), where the speeds `held` (nu,) are prescribed or latched."""
     scene = dense.scene
     motion = Motions(q, np.eye(dense.nu), np.zeros((dense.nu, dense.nu)))
-    J = np.concatenate([rows(dense, each, motion)[1] for each in scene.constraints], axis=1).T
+    J = np.concatenate([rows(dense, constraint, motion)[1] for constraint in scene.constraints], axis=1).T
     size = np.linalg.norm(J, axis=1, keepdims=True)
     size[size <= DEPENDENT] = 1.0
     left, values, _ = np.linalg.svd(J[:, ~held] / size)
     null = left[:, np.count_nonzero(values > DEPENDENT) :] / size
     count = len(null) - len(scene.couplings)
-    of_closures = {name: each @ null[:count] for name, each in wrenches(dense, q).items()}
+    of_closures = {name: wrench @ null[:count] for name, wrench in wrenches(dense, q).items()}
     changes = of_closures | through_hinges(dense, q, of_closures)
     for coupling, load in zip(scene.couplings, null[count:], strict=True):
         angular = coupled(scene, coupling)[0].named.coordinate.ANGULAR
         changes[coupling.name] = np.outer(np.repeat([angular, not angular], 3), load)
     drives = np.abs(J.T @ null)
-    least = UNCHANGED * max((np.max(np.abs(each), initial=0.0) for each in (*changes.values(), drives)), default=0.0)
+    least = UNCHANGED * max(
+        (np.max(np.abs(change), initial=0.0) for change in (*changes.values(), drives)), default=0.0
+    )
     reached = np.any(drives > least, axis=1) & held
     return OpenLoads(
-        {name: np.any(np.abs(each) > least, axis=1) for name, each in changes.items()},
+        {name: np.any(np.abs(change) > least, axis=1) for name, change in changes.items()},
         {x.owner: False for x in dense.tree.scalars if held[x.u]}
         | {x.owner: True for x in dense.tree.scalars if reached[x.u]},
     )

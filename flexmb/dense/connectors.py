@@ -87,8 +87,8 @@ def resistance(law: dict[str, Any], x: float) -> tuple[float, float]:
     if law["table"]:
         from scipy.integrate import quad  # slow to import, as is the interpolator
 
-        points = [each for each in law["table"] if min(0.0, x) < each < max(0.0, x)]
-        energy = quad(lambda each: _table(law, each), 0.0, x, points=points or None, epsabs=1e-13, limit=200)[0]
+        points = [knot for knot in law["table"] if min(0.0, x) < knot < max(0.0, x)]
+        energy = quad(lambda length: _table(law, length), 0.0, x, points=points or None, epsabs=1e-13, limit=200)[0]
         return _table(law, x), float(energy)
     powers = np.array([law["preload"], law["stiffness"], *law["stiffening"]])
     n = np.arange(len(powers))

@@ -67,8 +67,8 @@ class Instant:
 
     def seat(self, k: int, seat: Seat) -> MovingFrame:
         """One frame on member k."""
-        found = seat_frame(self._tree, self._frames, k, seat, self._motion).first
-        return MovingFrame(found.position[0], found.rotation[0])
+        frame = seat_frame(self._tree, self._frames, k, seat, self._motion).first
+        return MovingFrame(frame.position[0], frame.rotation[0])
 
 
 class SiteMotion(NamedTuple):
@@ -114,10 +114,10 @@ class DenseSystem:
     @kept
     def armature(self) -> Real:
         """(nu,) inertia along each speed alone, kg m^2 or kg."""
-        found = np.zeros(self.nu)
+        armature = np.zeros(self.nu)
         for x in self.tree.scalars:
-            found[x.u] = x.armature
-        return found
+            armature[x.u] = x.armature
+        return armature
 
     def bias(self, q: Real, u: Real, t: float = 0.0) -> Real:
         """c (nu,) in M udot + c = tau.
@@ -188,10 +188,10 @@ class DenseSystem:
         """Drive loads of prescribed coordinates by hinge, point mass or wheel, beyond springs, dampers and motors."""
         q, u = self.on_profile(q, u, t)
         residual = self.mass_matrix(q) @ rates + self.bias(q, u, t) - self.applied(q, u, t)
-        found: dict[str, Real] = {}
+        drives: dict[str, Real] = {}
         for x in self._prescribed:
-            found[x.owner] = np.append(found.get(x.owner, np.zeros(0)), residual[x.u])
-        return found
+            drives[x.owner] = np.append(drives.get(x.owner, np.zeros(0)), residual[x.u])
+        return drives
 
     def hinge_loads(self, t: float, q: Real, u: Real, rates: Real) -> dict[str, Real]:
         """Total load (6,) [torque; force] on the outboard body about the outboard hinge point, by hinge.
@@ -236,13 +236,13 @@ class DenseSystem:
         """Motion of all markers, with the true deformation at every level."""
         q, u = self.on_profile(q, u, t)
         now = Instant(self.tree, q, u, rates)
-        found = {}
+        markers = {}
         for marker in self.scene.markers:
             f = now.seat(*self.tree.sites[f"marker:{marker.name}"])
             velocity = np.concatenate([f.angular_velocity(), f.position.rate])
             acceleration = np.concatenate([f.angular_acceleration(), f.position.acceleration])
-            found[marker.name] = SiteMotion(f.position.value, f.rotation.value, velocity, acceleration)
-        return found
+            markers[marker.name] = SiteMotion(f.position.value, f.rotation.value, velocity, acceleration)
+        return markers
 
     def energy(self, q: Real, u: Real) -> dict[str, float]:
         """Kinetic, strain, spring and gravity energy (J)."""
@@ -336,7 +336,7 @@ class DenseSystem:
     def _loads(self, q: Real, t: float) -> dict[str, Wrenches]:
         """Loads at nodes by name, one point each."""
         now = self._at(q)
-        found = {}
+        loads = {}
         for load in self.scene.loads:
             site = now.seat(*self.tree.sites[f"load:{load.name}"])
             direction = np.array(load.direction)
@@ -344,16 +344,16 @@ class DenseSystem:
                 direction = site.rotation.value @ direction
             value, none = profile(load.function, t).value * direction[None], np.zeros((1, 3))
             torque, force = (value, none) if load.type == "torque" else (none, value)
-            found[load.name] = Wrenches(torque, force, site.position.value[None])
-        return found
+            loads[load.name] = Wrenches(torque, force, site.position.value[None])
+        return loads
 
     def outboard(self, k: int) -> list[int]:
         """Member k and all members outboard of it."""
-        found = [k]
+        outboard = [k]
         for i, member in enumerate(self.tree.members):
-            if member.parent in found:
-                found.append(i)
-        return found
+            if member.parent in outboard:
+                outboard.append(i)
+        return outboard
 
 
 def _turned(chosen: InertiaPoints, frames: MovingFrame) -> Real:

@@ -130,11 +130,11 @@ def build(scene: s.Scene, folder: Path | None = None) -> DenseTree:
     sites = {f"load:{x.name}": (tree.index(x.body), _seat(models[x.body], x.node)) for x in scene.loads}
     for x in scene.markers:
         sites[f"marker:{x.name}"] = tree.index(x.body), _seat(models[x.body], x.node, x.offset_m)
-    for each in scene.connectors:
-        if isinstance(each, BetweenNodes):
-            for side, end in zip("ab", ends(each), strict=True):
+    for connector in scene.connectors:
+        if isinstance(connector, BetweenNodes):
+            for side, end in zip("ab", ends(connector), strict=True):
                 seat = _seat(models[end.body], end.node, end.position_m, end.quaternion)
-                sites[f"connector {side}:{each.name}"] = tree.index(end.body), seat
+                sites[f"connector {side}:{connector.name}"] = tree.index(end.body), seat
     return replace(tree, sites=sites)
 
 
@@ -152,18 +152,14 @@ def _append(
         ScalarSpeed(hinge.name, q + n, u + n, *c.spring, c.armature, c.effort, c.prescribed)
         for n, (_, c) in enumerate(coordinates(hinge))
     ]
-    return replace(
-        tree, members=[*tree.members, member], scalars=tree.scalars + scalars, nq=q + nq + m, nu=u + nu + m
-    )
+    return replace(tree, members=[*tree.members, member], scalars=tree.scalars + scalars, nq=q + nq + m, nu=u + nu + m)
 
 
 def _append_wheel(tree: DenseTree, wheel: s.Wheel, seat: Seat) -> DenseTree:
     rotor = Rotor(wheel, len(tree.members) - 1, seat, tree.nq, tree.nu)
     friction, motor, prescribed = wheel.friction_Nms_rad, wheel.torque_Nm, wheel.prescribed_rad
     scalar = ScalarSpeed(wheel.name, tree.nq, tree.nu, 0.0, friction, 0.0, 0.0, motor, prescribed)
-    return replace(
-        tree, rotors=[*tree.rotors, rotor], scalars=[*tree.scalars, scalar], nq=tree.nq + 1, nu=tree.nu + 1
-    )
+    return replace(tree, rotors=[*tree.rotors, rotor], scalars=[*tree.scalars, scalar], nq=tree.nq + 1, nu=tree.nu + 1)
 
 
 def _seat(model: FlexibleModel, node: str, offset: ArrayLike = ZERO, quaternion: ArrayLike = IDENTITY) -> Seat:
@@ -175,7 +171,7 @@ def _model(body: s.Body, folder: Path | None) -> FlexibleModel:
         case s.RigidBody():
             frames = {name: (frame.position, frame.quaternion) for name, frame in rest_frames(body).items()}
             return rigid_model(body.mass_kg, np.array(body.com_m), np.array(body.inertia_kg_m2), frames)
-        case (s.BeamBody() | s.ModalBody()) if body.level in LEVELS:
+        case s.BeamBody() | s.ModalBody() if body.level in LEVELS:
             model = flexible_model(body, folder)
             return _stiff(model) if body.level == "rigid" else model
         case s.BeamBody() | s.ModalBody() | s.SidBody():

@@ -64,9 +64,9 @@ class RowChanges(NamedTuple):
     @property
     def inertia(self) -> Real:
         """Lambda = (J M^-1 J')^-1 (G,G), the loads that give the chosen rows unit accelerations; zero for others."""
-        found = np.zeros((len(self.loads), len(self.loads)))
-        found[np.ix_(self.chosen, self.chosen)] = np.linalg.inv(self.J[self.chosen] @ self.unit)
-        return found
+        inertia = np.zeros((len(self.loads), len(self.loads)))
+        inertia[np.ix_(self.chosen, self.chosen)] = np.linalg.inv(self.J[self.chosen] @ self.unit)
+        return inertia
 
 
 class VariedAccelerations(NamedTuple):

@@ -33,8 +33,8 @@ class Reduced(NamedTuple):
 
 def scalar_state(item: Item) -> tuple[list[float], list[float]]:
     """Initial values and rates of scalar coordinates (rad or m, per second)."""
-    found = [c for _, c in coordinates(item)]
-    return [c.value for c in found], [c.rate for c in found]
+    states = [c for _, c in coordinates(item)]
+    return [c.value for c in states], [c.rate for c in states]
 
 
 def scalar_names(item: Item) -> tuple[Names, Names]:

@@ -193,10 +193,10 @@ def recorded(
     posed: Problem | StiffProblem, room: int, fastest: FastestStates | None = None
 ) -> tuple[Any, RecordedSteps]:
     """The same problem with a record of its steps, which has room for so many times and no states but the first."""
-    kernels = [each.__wrapper_address__() for each in (posed.rhs, posed.project, posed.back, posed.leap)]
+    kernels = [kernel.__wrapper_address__() for kernel in (posed.rhs, posed.project, posed.back, posed.leap)]
     tables = posed.constants.kernel_address, posed.workspace.kernel_address
     on_group = [posed.move, posed.resolve] if isinstance(posed, StiffProblem) else []
-    moving = [each.__wrapper_address__() for each in on_group]
+    moving = [kernel.__wrapper_address__() for kernel in on_group]
     address = np.zeros(LOOK + 1, np.int64)
     address[: LEAP + 1 + len(moving)] = *kernels[:2], *tables, *kernels[2:], *moving
     record = RecordedSteps(

@@ -79,7 +79,7 @@ class Settings:
             )
         if self.spectral_radius is not None:
             if not method.damps:
-                damping = " or ".join(f'"{name}"' for name, each in INTEGRATORS.items() if each.damps)
+                damping = " or ".join(f'"{name}"' for name, integrator in INTEGRATORS.items() if integrator.damps)
                 raise ValueError(f'spectral_radius is for method {damping}: leave it out for "{self.method}"')
             if not 0.0 <= self.spectral_radius <= 1.0:
                 raise ValueError(

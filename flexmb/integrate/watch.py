@@ -407,7 +407,7 @@ def watch(
 ) -> Watch:  # fmt: skip
     """Of lists of equal lengths, for a state of `size` numbers; who has signals lets it see them by `Watch.seeing`."""
     count = len(entries)
-    whole = [np.array(each, np.int64) for each in (entries, directions, sides, came)]
+    whole = [np.array(column, np.int64) for column in (entries, directions, sides, came)]
     return Watch(
         whole[0], np.array(levels, float), *whole[1:], np.array(still, float), np.zeros(count, np.int64),
         np.zeros(count), np.zeros(count), np.zeros(count, np.int64), np.zeros(count, np.int64), np.zeros(0),

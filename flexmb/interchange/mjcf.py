@@ -166,11 +166,11 @@ class _Model:
     def _along_dofs(self, what: str) -> Real:
         """(nv,) armature or damping of joints, and what actuators at joints add to it: gear^2 times their own."""
         m = self.m
-        found = np.array(getattr(m, f"dof_{what}"), float)
+        values = np.array(getattr(m, f"dof_{what}"), float)
         for i, own in enumerate(getattr(m, f"actuator_{what}", ())):
             if own:  # at a hinge or a slide, see `_refuse`
-                found[m.jnt_dofadr[m.actuator_trnid[i, 0]]] += m.actuator_gear[i, 0] ** 2 * own
-        return found
+                values[m.jnt_dofadr[m.actuator_trnid[i, 0]]] += m.actuator_gear[i, 0] ** 2 * own
+        return values
 
     def _stiffness(self, j: int) -> float:
         return 0.0 if self._switched_off("SPRING") else float(self.m.jnt_stiffness[j])
@@ -194,8 +194,11 @@ class _Model:
         """ModelError for elements that change the motion and have no counterpart in a scene."""
         m = self.m
         for count, what, remedy in (
-            (int(np.sum(~np.isin(m.eq_type, KNOWN_EQUALITIES))), "equality constraints of flexible parts",
-             "remove them, and add flexible bodies to the scene"),
+            (
+                int(np.sum(~np.isin(m.eq_type, KNOWN_EQUALITIES))),
+                "equality constraints of flexible parts",
+                "remove them, and add flexible bodies to the scene",
+            ),
             (getattr(m, "nflex", 0), "flexible parts", "remove them, and add flexible bodies to the scene"),
             (m.npluginstate, "plugins", "remove them"),
         ):
@@ -240,32 +243,32 @@ class _Model:
     def _notes(self) -> list[str]:
         m = self.m
         joints = [self._joint_name(j) for j in range(m.njnt)]
-        found = []
+        notes = []
         if any(m.geom_contype) or any(m.geom_conaffinity):
-            found.append("contacts are left out: bodies pass through each other")
+            notes.append("contacts are left out: bodies pass through each other")
         single = [kind in SINGLE for kind in m.jnt_type.tolist()]
         stopped = self.extras.stop_stiffness is not None
         if limited := [joints[j] for j in range(m.njnt) if m.jnt_limited[j] and not (stopped and single[j])]:
-            found.append(f"limits of joints are left out: {listed(limited)}{'' if stopped else f' ({STOPS})'}")
+            notes.append(f"limits of joints are left out: {listed(limited)}{'' if stopped else f' ({STOPS})'}")
         smooth = self.extras.smoothing is not None
         rubbing = {int(m.dof_jntid[i]) for i in np.flatnonzero(m.dof_frictionloss)}
         if rough := [joints[j] for j in sorted(rubbing) if not (smooth and single[j])]:
-            found.append(f"dry friction is left out: {listed(rough)}{'' if smooth else f' ({SMOOTH})'}")
+            notes.append(f"dry friction is left out: {listed(rough)}{'' if smooth else f' ({SMOOTH})'}")
         if heavy := [joints[j] for j in range(m.njnt) if m.jnt_type[j] == FREE and self._armature[m.jnt_dofadr[j]]]:
-            found.append(f"armatures of free joints are mass and inertia without weight: {listed(heavy)}")
+            notes.append(f"armatures of free joints are mass and inertia without weight: {listed(heavy)}")
         if idle := [str(m.tendon(k).name) or f"tendon {k}" for k in range(m.ntendon)]:
-            found.append(f"limits, friction and actuators of tendons are left out: {listed(idle)}")
+            notes.append(f"limits, friction and actuators of tendons are left out: {listed(idle)}")
         if self.couplings.count:
-            found.append("equality constraints of coordinates are exact here, and springs and dampers in MuJoCo")
+            notes.append("equality constraints of coordinates are exact here, and springs and dampers in MuJoCo")
         if self.closures.count:
-            found.append("equality constraints of bodies are exact here, and springs and dampers in MuJoCo")
+            notes.append("equality constraints of bodies are exact here, and springs and dampers in MuJoCo")
         if inactive := [*self.couplings.inactive, *self.closures.inactive]:
-            found.append(f"inactive equality constraints are left out: {listed(inactive)}")
+            notes.append(f"inactive equality constraints are left out: {listed(inactive)}")
         if m.nu:
-            found.append(f"{m.nu} actuators are left out, with the forces of servos at zero control")
+            notes.append(f"{m.nu} actuators are left out, with the forces of servos at zero control")
         if moved := [joints[j] for j in range(m.njnt) if m.jnt_type[j] > BALL and m.qpos0[m.jnt_qposadr[j]] != 0.0]:
-            found.append(f"coordinates count from the reference position, not from zero: {listed(moved)}")
-        return found
+            notes.append(f"coordinates count from the reference position, not from zero: {listed(moved)}")
+        return notes
 
     def _fail(self, what: str, remedy: str) -> NoReturn:
         raise ModelError(f"{self.file}: {what}: {remedy}")

@@ -39,7 +39,7 @@ class MjcfClosures:
         taken = {str(m.equality(i).name) for i in range(m.neq)}
         for i in np.flatnonzero(np.isin(m.eq_type, (CONNECT, WELD))):
             name = str(m.equality(i).name) or next(
-                each for each in (f"equality {i}", *(f"equality {i} {k}" for k in range(m.neq))) if each not in taken
+                name for name in (f"equality {i}", *(f"equality {i} {k}" for k in range(m.neq))) if name not in taken
             )
             if m.eq_active0[i]:
                 kind: ClosureKind = "spherical" if m.eq_type[i] == CONNECT else "weld"

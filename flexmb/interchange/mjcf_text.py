@@ -50,8 +50,8 @@ def refuse_bad_text(path: Path) -> None:
             folders += [path.parent / element.get(key, "") for key in ("assetdir", "meshdir") if element.get(key)]
         _refuse_elements(file, root)
         for named in _named_files(root):
-            found = (folder / named for folder in (*folders, file.parent))
-            waiting += [each for each in found if os.path.lexists(each)]  # MuJoCo reports missing files
+            texts = (folder / named for folder in (*folders, file.parent))
+            waiting += [path for path in texts if os.path.lexists(path)]  # MuJoCo reports missing files
 
 
 def _parsed(file: Path) -> ElementTree.Element:
@@ -107,7 +107,7 @@ def _refuse_sizes(file: Path, element: ElementTree.Element) -> None:
         *(((key,), "size", MOST_RESERVED) for key in element.attrib if key.startswith(("nuser_", "nkey"))),
     ):  # fmt: skip
         if element.tag == tag:
-            size = math.prod(max(1, each) for key in keys for each in _counts(element, key))
+            size = math.prod(max(1, count) for key in keys for count in _counts(element, key))
             if size > most:
                 _fail(file, element, keys[0], f"it requests {size} entries, and the limit is {most}", "reduce it")
 

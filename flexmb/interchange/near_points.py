@@ -69,7 +69,7 @@ def points_with(S: Real, sums: Real, omega: Real) -> NearPoints:
 
 def _distance(elastic: Real, start: Real, omega: Real) -> float:
     """The largest relative difference of the frequencies that these modal masses (m,m) of the free structure give."""
-    exact, near = (np.linalg.eigvalsh(each / np.outer(omega, omega))[::-1] for each in (elastic, start))
+    exact, near = (np.linalg.eigvalsh(matrix / np.outer(omega, omega))[::-1] for matrix in (elastic, start))
     there = exact > SLIGHT / np.min(omega) ** 2
     if np.any(near[there] <= 0.0):
         return float("inf")
@@ -98,7 +98,7 @@ def _nearest(fields: Real, products: Real, others: Real, number: int) -> Real:
     Q, R, _ = qr(others / np.where(size > 0.0, size, 1.0), pivoting=True)
     free = Q[:, np.count_nonzero(np.abs(np.diag(R)) > MASSLESS) :]
     left, _, right = np.linalg.svd(free.T @ fields @ root, full_matrices=False)
-    found = np.asarray(free @ (left @ right) @ root)
-    if not np.max(np.abs(found.T @ found - root @ root)) <= ROUNDING * np.abs(values).max():  # too few points
+    inertias = np.asarray(free @ (left @ right) @ root)
+    if not np.max(np.abs(inertias.T @ inertias - root @ root)) <= ROUNDING * np.abs(values).max():  # too few points
         raise NoMasses(number)
-    return found
+    return inertias

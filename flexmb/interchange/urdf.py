@@ -69,7 +69,7 @@ def _parsed(path: Path) -> ElementTree.Element:
         raise ModelError(f"{path}: {error}") from None
     except expat.ExpatError as error:
         raise ModelError(f"{path}: not XML ({error}): correct it there") from None
-    if any(each.tag.startswith("xacro:") for each in root.iter()):
+    if any(element.tag.startswith("xacro:") for element in root.iter()):
         raise ModelError(f"{path}: it has xacro macros: expand them first, by the command xacro")
     if root.tag != "robot":
         raise ModelError(f'{path}: the outermost element is "{root.tag}", not "robot": is it a URDF file?')
@@ -117,13 +117,13 @@ class _Robot:
         return ImportedScene(builder.scene(), tuple(self._notes()))
 
     def _named(self, tag: str) -> dict[str, ElementTree.Element]:
-        found: dict[str, ElementTree.Element] = {}
+        elements: dict[str, ElementTree.Element] = {}
         for element in self.robot.findall(tag):
             name = element.get("name")
-            if not name or name in found:
+            if not name or name in elements:
                 self._fail(f'{tag} "{name}"', "it has no name, or one that is taken", "rename it")
-            found[name] = element
-        return found
+            elements[name] = element
+        return elements
 
     def _refuse_doubles(self) -> None:
         """ModelError for a link, a joint or an inertial that has twice what it may have once."""
@@ -232,15 +232,15 @@ class _Robot:
     def _losses(self, name: str, joint: ElementTree.Element) -> float:
         """The damping of a joint that moves; damping that no coordinate has is noted."""
         element = joint.find("dynamics")
-        found = {"damping": 0.0, "friction": 0.0}
-        for key in found if element is not None else ():
+        losses = {"damping": 0.0, "friction": 0.0}
+        for key in losses if element is not None else ():
             assert element is not None
-            found[key] = _real(text := element.get(key, "0"))
-            if not (usable(found[key]) and found[key] >= 0.0):
+            losses[key] = _real(text := element.get(key, "0"))
+            if not (usable(losses[key]) and losses[key] >= 0.0):
                 self._fail(f'joint "{name}"', f"{key} is {text!r}", "give a number in SI units, zero or more")
-        if found["damping"] and joint.get("type") in ("floating", "planar"):
+        if losses["damping"] and joint.get("type") in ("floating", "planar"):
             self.ignored.setdefault(DAMPING, []).append(name)
-        return found["damping"]
+        return losses["damping"]
 
     def _origin(self, place: str, element: ElementTree.Element) -> tuple[Real, Real]:
         """Rotation (3,3) and position (3,) m of a frame; the rotation is about the fixed axes x, then y, then z."""
@@ -286,7 +286,7 @@ class _Robot:
             yield f"joints begin {BEYOND}, and are pushed back: {listed(names)}"
         if names := self.ignored.get(DAMPING):
             yield f"{DAMPING} is left out: {listed(names)}"
-        others = sorted({each.tag for each in self.robot} - {"link", "joint", *NO_MECHANICS})
+        others = sorted({element.tag for element in self.robot} - {"link", "joint", *NO_MECHANICS})
         if others:
             yield f"elements that URDF does not define are left out: {listed(others)}"
         if self.repaired:

@@ -53,24 +53,28 @@ class Mimics:
     def couple(self, builder: SceneBuilder) -> None:
         """Add the couplings, named after the joints that they lead."""
         taken = set(self._joints)
-        for each in self._of.values():
-            name = next(name for name in (f"{each.joint}.mimic{end}" for end in ("", *range(99))) if name not in taken)
-            builder.coupling(name, each.joint, {each.other: each.multiplier}, offset=each.offset)
+        for relation in self._of.values():
+            name = next(
+                name for name in (f"{relation.joint}.mimic{end}" for end in ("", *range(99))) if name not in taken
+            )
+            builder.coupling(name, relation.joint, {relation.other: relation.multiplier}, offset=relation.offset)
 
     def _mimic(self, name: str, element: ElementTree.Element) -> Mimic:
         place, other = f'joint "{name}"', element.get("joint", "")
         if other not in self._joints:
             self._fail(place, f'it mimics "{other}", which is not a joint', "give the name of a joint")
-        for each in (name, other):
-            kind = self._joints[each].get("type", "")
+        for joint in (name, other):
+            kind = self._joints[joint].get("type", "")
             if kind not in SCALAR:
-                what = f'it mimics "{other}", and "{each}" of type "{kind}" has no single coordinate'
+                what = f'it mimics "{other}", and "{joint}" of type "{kind}" has no single coordinate'
                 self._fail(place, what, f"mimic joints are {', '.join(SCALAR)}")
-        found = {key: self._number(place, element, key, usual) for key, usual in (("multiplier", 1.0), ("offset", 0.0))}
-        if found["multiplier"] == 0.0:
+        numbers = {
+            key: self._number(place, element, key, usual) for key, usual in (("multiplier", 1.0), ("offset", 0.0))
+        }
+        if numbers["multiplier"] == 0.0:
             what = "its multiplier is zero: it follows no joint"
             self._fail(place, what, "make the joint fixed, at its offset")
-        return Mimic(name, other, found["multiplier"], found["offset"])
+        return Mimic(name, other, numbers["multiplier"], numbers["offset"])
 
     def _number(self, place: str, element: ElementTree.Element, key: str, usual: float) -> float:
         text = element.get(key)
@@ -86,9 +90,9 @@ class Mimics:
         chain = [self._of[name]]
         while chain[-1].other in self._of:
             chain.append(self._of[chain[-1].other])
-            if chain[-1].joint in {each.joint for each in chain[:-1]} | {name}:
+            if chain[-1].joint in {relation.joint for relation in chain[:-1]} | {name}:
                 self._fail(f'joint "{name}"', "it mimics itself, by way of others", "let one of them mimic none")
         value = 0.0
-        for each in reversed(chain):
-            value = each.multiplier * value + each.offset
+        for relation in reversed(chain):
+            value = relation.multiplier * value + relation.offset
         return value

@@ -89,8 +89,8 @@ class Configuration:
 
     def seat(self, k: int, seat: Seat) -> tuple[Complex, Complex]:
         """Origin (3,) and rotation (3,3) of a frame fixed to a node of member k."""
-        found = seat_frame(self.tree, self._frames, k, seat, self._motion)
-        return found.position.value[0, 0], found.rotation.value[0, 0]
+        frame = seat_frame(self.tree, self._frames, k, seat, self._motion)
+        return frame.position.value[0, 0], frame.rotation.value[0, 0]
 
     def hinge_point(self, k: int) -> Complex:
         """O_k (3,)."""
@@ -102,9 +102,9 @@ class Configuration:
         if k < 0 or self.tree.members[k].model.mode_count == 0:
             return self.seat(k, at_node)[0], np.zeros((6, 0), complex)
         origin, R = self.frame(k)
-        found = on_body(at_node, self._unit_modes(k).modes(self.tree.members[k]))
-        Pi = np.vstack([R @ found.angular_velocity()[:, 0].T, R @ found.position.rate[:, 0].T])
-        return origin + R @ found.position.value[0, 0], Pi
+        frame = on_body(at_node, self._unit_modes(k).modes(self.tree.members[k]))
+        Pi = np.vstack([R @ frame.angular_velocity()[:, 0].T, R @ frame.position.rate[:, 0].T])
+        return origin + R @ frame.position.value[0, 0], Pi
 
     def transmission(self, k: int, seat: Seat) -> tuple[Complex, Complex]:
         """Position t (3,) of a seat's node on member k, and A (m+6,6) = [Pi'; phi(k, t)] (15)."""
@@ -122,10 +122,10 @@ class Configuration:
         """Joint map (n,6): velocity of O_k relative to O_k+ for each hinge speed (8)."""
         member = self.tree.members[k]
         n = member.u_hinge.stop - member.u_hinge.start
-        found = hinge_frame(member.hinge, self._unit(member.u_hinge).hinge(member))
+        H = hinge_frame(member.hinge, self._unit(member.u_hinge).hinge(member))
         R = self.seat(member.parent, member.inboard)[1]
-        angular = np.broadcast_to(found.angular_velocity()[:, 0], (n, 3))
-        linear = np.broadcast_to(found.position.rate[:, 0], (n, 3))
+        angular = np.broadcast_to(H.angular_velocity()[:, 0], (n, 3))
+        linear = np.broadcast_to(H.position.rate[:, 0], (n, 3))
         return np.hstack([angular @ R.T, linear @ R.T])
 
     def joint_map(self, k: int) -> Complex:

@@ -97,12 +97,12 @@ def _is_regular(M: a.Real) -> bool:
 
 def _node_ports(c: a.Constants) -> dict[int, list[int]]:
     """For each flexible body, its deforming ports that carry hinges, in the order of the outboard bodies."""
-    found: dict[int, list[int]] = {k: [] for k in np.flatnonzero(c.body["modes"]).tolist()}
+    ports: dict[int, list[int]] = {k: [] for k in np.flatnonzero(c.body["modes"]).tolist()}
     hinged = np.flatnonzero(c.body["inboard_port"] >= 0)
     for parent, port in zip(c.body["parent"][hinged].tolist(), c.body["inboard_port"][hinged].tolist(), strict=True):
-        if parent in found:
-            found[parent].append(port)
-    return found
+        if parent in ports:
+            ports[parent].append(port)
+    return ports
 
 
 def _reduced_constants(

@@ -117,10 +117,10 @@ def _in_strips(c, w, k):
         row = s * own
         loads = vec6(Y[n], 0)
         taken = axpy3(loads[0], row, taken[0]), axpy3(loads[1], row, taken[1])
-    found = w.point_mode
-    put6(w, found, 0, taken)
-    P = column_inertia(found)
-    store6(w.body[k].hinge_force, 0, sum6(vec6(w.body[k].force, 0), column6(found, LOAD)))
+    sums = w.point_mode
+    put6(w, sums, 0, taken)
+    P = column_inertia(sums)
+    store6(w.body[k].hinge_force, 0, sum6(vec6(w.body[k].force, 0), column6(sums, LOAD)))
     store_inertia(w.body[k].hinge_inertia, 0, sum_inertia(load_inertia(w.body[k].inertia, 0), P))
     return True
 

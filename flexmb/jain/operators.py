@@ -225,11 +225,11 @@ class Operators:
 
     def _resolvent(self, E: Real) -> Real:
         """(1 - E)^-1 = 1 + E + E^2 + ..., E nilpotent with one block in the columns of each body, at its parent."""
-        found = np.eye(len(E))
+        resolvent = np.eye(len(E))
         for p, columns in zip(self.parent, self.columns, strict=True):
             if p >= 0:
-                found[:, columns] += found[:, self.columns[p]] @ E[self.columns[p], columns]
-        return found
+                resolvent[:, columns] += resolvent[:, self.columns[p]] @ E[self.columns[p], columns]
+        return resolvent
 
     def _add_to_parent(self, inertia: Real, k: int, own: Real) -> None:
         """Add Phi(p, k) own Phi'(p, k) to the parent's block, in place."""
@@ -305,7 +305,7 @@ class SpatialOperators:
         fall = np.zeros(len(M_m))
         for at in columns:
             fall[at][-3:] = self._dense.scene.gravity_m_s2
-        found = M_m @ fall
+        forces = M_m @ fall
         for load in self._dense.scene.loads:
             k, seat = self._bodies.sites[f"load:{load.name}"]
             direction = np.array(load.direction)
@@ -313,11 +313,11 @@ class SpatialOperators:
                 direction = value(now.seat(k, seat)[1]) @ direction
             F = np.zeros(6)
             F[slice(0, 3) if load.type == "torque" else slice(3, 6)] = profile(load.function, t).value * direction
-            found[columns[k]] += value(now.transmission(k, seat)[1]) @ F
+            forces[columns[k]] += value(now.transmission(k, seat)[1]) @ F
         for name, gripped in self._dense.grips(now.q, now.u, t).items():
             for side, F in (("a", gripped.on_a), ("b", gripped.on_b)):
                 k, seat = self._bodies.sites[f"connector {side}:{name}"]
                 if k >= 0:
                     node, A = now.transmission(k, seat)
-                    found[columns[k]] += value(A @ phi(now.seat(k, seat)[0] - node)) @ F
-        return found
+                    forces[columns[k]] += value(A @ phi(now.seat(k, seat)[0] - node)) @ F
+        return forces

@@ -47,11 +47,11 @@ def closed_loop(system: System, state: State, model: Callable[[Equations, State]
     if system.constraints:
         state = system.admissible(state, "state")
     loop = ClosedLoop(system, state)
-    found = loop.at(state, loop.initial, model)
+    loop_model = loop.at(state, loop.initial, model)
     return replace(
-        found.of_motion,
-        states=(*found.of_motion.states, *((name, "") for name in loop.state_names)),
-        A=found.A, B=found.B, C=found.C,
+        loop_model.of_motion,
+        states=(*loop_model.of_motion.states, *((name, "") for name in loop.state_names)),
+        A=loop_model.A, B=loop_model.B, C=loop_model.C,
     )  # fmt: skip
 
 
@@ -107,7 +107,7 @@ class ClosedLoop:
 
 
 def _refuse(system: System) -> None:
-    sampled = [each.name for each in system.scene.controllers if each.period_s is not None]
+    sampled = [controller.name for controller in system.scene.controllers if controller.period_s is not None]
     if sampled:
         raise NotImplementedError(
             f'controller "{sampled[0]}" is sampled: a closed loop with instants has no linear model of this kind; '

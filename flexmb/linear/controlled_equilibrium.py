@@ -63,10 +63,10 @@ _CLOSER = "give a guess closer to it, or a setpoint that the drives can hold"
 
 
 def _look(loop: ClosedLoop, state: State, x: Real) -> _Place:
-    found = loop.at(state, x, held_model, one_sided=True)  # Newton's method needs a slope, of either side
-    n = len(found.of_motion.rates)
-    rows, columns = slice(n, None), np.r_[:n, 2 * n : len(found.A)]
-    return _Place(state, x, np.r_[found.of_motion.rates, found.rates], found.A[rows][:, columns])
+    look = loop.at(state, x, held_model, one_sided=True)  # Newton's method needs a slope, of either side
+    n = len(look.of_motion.rates)
+    rows, columns = slice(n, None), np.r_[:n, 2 * n : len(look.A)]
+    return _Place(state, x, np.r_[look.of_motion.rates, look.rates], look.A[rows][:, columns])
 
 
 def _damped(loop: ClosedLoop, equations: Equations, here: _Place, inverse: Real, step: Real) -> _Place:

@@ -70,5 +70,5 @@ def found_equilibrium(system: System | Scene, guess: State | None) -> tuple[Equi
         return as_equilibrium(state, None), system
     equations, guess = entering(system, guess)
     held = equations.held(guess.t)
-    found = balanced(held, replace(guess, u=np.zeros_like(guess.u)))
-    return as_equilibrium(found.state, verdict(squares(found))), equations.system
+    equilibrium_state = balanced(held, replace(guess, u=np.zeros_like(guess.u)))
+    return as_equilibrium(equilibrium_state.state, verdict(squares(equilibrium_state))), equations.system

@@ -72,7 +72,9 @@ class EquilibriumPath:
     def at(self, value: float) -> tuple[Equilibrium, ...]:
         """All equilibria of the path at one of the values that were asked for, in order; ValueError for others."""
         value = arguments.number("value", value)
-        found = tuple(state for each, state in zip(self.values, self.states, strict=True) if each == value)
+        found = tuple(
+            state for value_of_state, state in zip(self.values, self.states, strict=True) if value_of_state == value
+        )
         if not found:
             raise ValueError(f"{value:g} is not one of the values that the path was asked for, or it ends before")
         return found
@@ -98,11 +100,11 @@ def equilibrium_path(scene: Scene, number: str, values: Sequence[float] | Real) 
         raise ValueError("values: give two or more numbers in a row that all rise or all fall")
     family = _Family(scene, number, asked)
     points = list(_followed(family, asked))
-    states = tuple(as_equilibrium(each.at.state, verdict(each.squares)) for _, each in points)
+    states = tuple(as_equilibrium(point.at.state, verdict(point.squares)) for _, point in points)
     warn(of_states(family.system, states))
-    critical = [(kind, each, state) for (kind, each), state in zip(points, states, strict=True) if kind is not None]
-    found = tuple(CriticalPoint(kind, each.p, state) for kind, each, state in critical)
-    passed = np.array([each.p for _, each in points])
+    critical = [(kind, point, state) for (kind, point), state in zip(points, states, strict=True) if kind is not None]
+    found = tuple(CriticalPoint(kind, point.p, state) for kind, point, state in critical)
+    passed = np.array([point.p for _, point in points])
     passed.flags.writeable = False
     return EquilibriumPath(number, passed, states, found)
 
@@ -157,11 +159,11 @@ class _Family:
         at = equations.forces(found_equilibrium(self.system, None)[0])
         ahead = np.zeros(len(at.basis) + 1)
         ahead[-1] = onwards * self.range
-        found = _Corrected(p, at, 0)
-        tangent = self.point(found, ahead).tangent
+        corrected = _Corrected(p, at, 0)
+        tangent = self.point(corrected, ahead).tangent
         displaced = self.length(at, np.r_[tangent[:-1], 0.0]) * self.range / abs(float(tangent[-1]))
         self.unit = float(np.clip(displaced, LEAST_UNIT, 1.0))
-        return self.point(found, ahead)
+        return self.point(corrected, ahead)
 
     def _made(self, p: float, like: Equations | None) -> tuple[float, Equations]:
         """At rest, with functions of time at their values at t = 0."""
@@ -239,22 +241,22 @@ class _Family:
         try:
             equations, ahead = self.equations(point.p), h * point.tangent
             state = equations.moved(point.at, ahead[:-1][point.at.chosen])
-            found = self.corrected(point.p + float(ahead[-1]), state, point.by_number, point.tangent, h)
-            if found is None:
+            corrected = self.corrected(point.p + float(ahead[-1]), state, point.by_number, point.tangent, h)
+            if corrected is None:
                 return None
-            there = self.point(found, point.tangent)
+            there = self.point(corrected, point.tangent)
         except (DynamicsError, np.linalg.LinAlgError):
             return None
         turned = float(self.weighed(there.at, there.tangent) @ point.tangent)
-        return (there, found.taken) if turned >= STRAIGHT or h <= 16.0 * SHORTEST else None
+        return (there, corrected.taken) if turned >= STRAIGHT or h <= 16.0 * SHORTEST else None
 
     def exactly(self, point: _Point, value: float) -> _Point | None:
         """The equilibrium at a value near that of a point."""
         try:
             across = np.zeros(len(point.tangent))
             across[-1] = self.range
-            found = self.corrected(value, point.at.state, point.by_number, across, LONGEST / self.unit)
-            return None if found is None else self.point(found, point.tangent)
+            corrected = self.corrected(value, point.at.state, point.by_number, across, LONGEST / self.unit)
+            return None if corrected is None else self.point(corrected, point.tangent)
         except (DynamicsError, np.linalg.LinAlgError):
             return None
 
@@ -293,7 +295,7 @@ def _followed(family: _Family, asked: Real) -> Iterator[tuple[Kind | None, _Poin
 
 def _between(family: _Family, here: _Point, there: _Point, h: float, asked: Real) -> list[tuple[Kind | None, _Point]]:
     """What lies on a step of length h, in order: critical points, and values that were asked for."""
-    found: list[tuple[float, Kind | None, _Point]] = []
+    crossings: list[tuple[float, Kind | None, _Point]] = []
     turns = here.tangent[-1] * there.tangent[-1] < 0.0
     changes = abs(there.negative - here.negative)
     tests: list[tuple[Kind, Callable[[_Point], float], bool]] = [
@@ -303,8 +305,8 @@ def _between(family: _Family, here: _Point, there: _Point, h: float, asked: Real
     for kind, test, happens in tests:
         place = _located(family, here, h, there, test) if happens else None
         if place is not None:
-            found.append((place[0], kind, place[1]))
-    ends = sorted([(0.0, here), *((s, point) for s, _, point in found), (h, there)], key=lambda each: each[0])
+            crossings.append((place[0], kind, place[1]))
+    ends = sorted([(0.0, here), *((s, point) for s, _, point in crossings), (h, there)], key=lambda item: item[0])
     for (s0, a), (s1, b) in zip(ends[:-1], ends[1:], strict=True):
         for value in asked:
             if (a.p < value <= b.p) or (b.p <= value < a.p):
@@ -313,8 +315,8 @@ def _between(family: _Family, here: _Point, there: _Point, h: float, asked: Real
                 exact = family.exactly(b if near is None else near[0], float(value))
                 if exact is None:
                     raise EquilibriumError(_lost(family, here, f"no equilibrium at {value:g} was found on it"))
-                found.append((s, None, exact))
-    return [(kind, point) for _, kind, point in sorted(found, key=lambda each: each[0])]
+                crossings.append((s, None, exact))
+    return [(kind, point) for _, kind, point in sorted(crossings, key=lambda item: item[0])]
 
 
 def _located(

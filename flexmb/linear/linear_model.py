@@ -82,8 +82,8 @@ class Stability:
     tolerance: float
 
     def __str__(self) -> str:
-        found = f"largest real part {self.eigenvalue.real:.6g} rad/s, known to {self.tolerance:.1g}"
-        return f"{self.verdict}: {found}"
+        text = f"largest real part {self.eigenvalue.real:.6g} rad/s, known to {self.tolerance:.1g}"
+        return f"{self.verdict}: {text}"
 
 
 @dataclass(frozen=True, eq=False)

@@ -47,18 +47,18 @@ def balanced(equations: Equations, guess: State) -> RestForces:
     start = equations.on_functions(guess)
     if not equations.freedom:
         return equations.forces(start)
-    found = _newton(equations, start)
-    if found is not None and (found.settling or found.is_near):
-        return found.at
+    equilibrium = _newton(equations, start)
+    if equilibrium is not None and (equilibrium.settling or equilibrium.is_near):
+        return equilibrium.at
     try:
         return _relaxed(equations, start)
     except EquilibriumError:
-        if found is None:
+        if equilibrium is None:
             raise
     except (DynamicsError, np.linalg.LinAlgError) as error:
-        if found is None:
+        if equilibrium is None:
             raise EquilibriumError(f'scene "{equations.system.scene.name}": no equilibrium found: {error}') from None
-    return found.at
+    return equilibrium.at
 
 
 def _relaxed(equations: Equations, start: State) -> RestForces:
@@ -211,8 +211,8 @@ def _damped(equations: Equations, now: _Linearised) -> tuple[State, float] | Non
 def squares(at: RestForces) -> Complex:
     """The eigenvalues omega^2 (rad^2/s^2) of the tangent stiffness along what closures allow, against the inertia."""
     square = np.ix_(at.movable, at.movable)
-    found: Complex = eigvals(at.stiffness[square], at.mass[square]) if len(at.movable) else np.zeros(0, complex)
-    return found
+    values: Complex = eigvals(at.stiffness[square], at.mass[square]) if len(at.movable) else np.zeros(0, complex)
+    return values
 
 
 def verdict(squares: Complex) -> Stability:

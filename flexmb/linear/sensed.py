@@ -46,7 +46,7 @@ class ChangedRow(NamedTuple):
 
 def sensed(system: System, at: ChangedRow) -> Real:
     """(S,k) change of all sensor signals, in the order of the scene."""
-    rows = [np.zeros((0, at.change.shape[1])), *(_change(system, each, at) for each in system.scene.sensors)]
+    rows = [np.zeros((0, at.change.shape[1])), *(_change(system, sensor, at) for sensor in system.scene.sensors)]
     return np.concatenate(rows)
 
 
@@ -161,7 +161,6 @@ def _of_distance(sensor: DistanceSensor, a: tuple[Real, Real], b: tuple[Real, Re
     rate = along @ value[velocity]
     faster = along @ change[velocity] + (value[velocity] @ change[position] - rate * longer) / length
     return np.vstack([longer, faster])
-
 
 
 class OfSensors(NamedTuple):

@@ -56,9 +56,9 @@ def steady_spin(system: System | Scene, hinge: str, rate: float, guess: State | 
     EquilibriumError where no deformation is found. Warns (`SceneWarning`) as `simulate` does of levels, points and
     polynomials.
     """
-    found = spun(system, hinge, rate, guess)
-    warn(looked_at([found.moving]))
-    return found
+    state_of_spin = spun(system, hinge, rate, guess)
+    warn(looked_at([state_of_spin.moving]))
+    return state_of_spin
 
 
 def spun(system: System | Scene, hinge: str, rate: float, guess: State | None = None) -> SteadySpin:

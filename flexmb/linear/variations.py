@@ -170,9 +170,9 @@ class Equations:
 
     def free_variation(self, state: State) -> FreeVariation:
         """How all accelerations change; DynamicsError where these do not exist."""
-        found = self._free.at(state.t, pack(state))
+        variation = self._free.at(state.t, pack(state))
         self._examine(state)
-        return found
+        return variation
 
     def _examine(self, state: State) -> None:
         """DynamicsError if pivots of the last motion, which was at this state, are at rounding level."""
@@ -291,13 +291,13 @@ class Equations:
 def same_structure(a: Any, b: Any) -> bool:
     """Whether one workspace serves two bundles of tables: shapes and integers agree, of functions of time only how many
     there are."""
-    for each in fields(a):
-        one, other = getattr(a, each.name), getattr(b, each.name)
-        if one is other or each.name == "table":
+    for field in fields(a):
+        one, other = getattr(a, field.name), getattr(b, field.name)
+        if one is other or field.name == "table":
             continue
         if one.shape != other.shape:
             return False
-        for name in () if each.name == "function" else one.dtype.names or ():
+        for name in () if field.name == "function" else one.dtype.names or ():
             if one[name].dtype == np.int64 and not np.array_equal(one[name], other[name]):
                 return False
     return True

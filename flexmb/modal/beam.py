@@ -168,5 +168,5 @@ def _weighted(rows: Real, weight: Real) -> Real:
 def _congruent(rows: Real, matrices: Real) -> Real:
     """sum rows_n' matrices_n rows_n of rows (n, 6, size) and symmetric matrices (n, 6, 6)."""
     size = rows.shape[2]
-    found: Real = rows.reshape(-1, size).T @ (matrices @ rows).reshape(-1, size)
-    return 0.5 * (found + found.T)
+    matrix: Real = rows.reshape(-1, size).T @ (matrices @ rows).reshape(-1, size)
+    return 0.5 * (matrix + matrix.T)

@@ -58,14 +58,14 @@ def with_equivalent_masses(model: FlexibleModel, like: FlexibleModel | None = No
         inertia=joined(np.zeros((size, 3, 3)), model.inertia),
         translation=joined(translation, model.translation),
         rotation=joined(none(translation), model.rotation),
-        second=join_second(SecondOrder(G, none(G)), model.second.map(lambda each: each[turning])),
+        second=join_second(SecondOrder(G, none(G)), model.second.map(lambda M: M[turning])),
     )
 
 
 def _still(model: FlexibleModel) -> Flags:
     """Which points (n,) have a mass without an offset."""
-    found: Flags = (model.mass > 0.0) & ~np.any(model.com_offset != 0.0, axis=1)
-    return found
+    flags: Flags = (model.mass > 0.0) & ~np.any(model.com_offset != 0.0, axis=1)
+    return flags
 
 
 def _fields(model: FlexibleModel, still: Flags) -> Real:

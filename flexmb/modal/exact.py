@@ -186,9 +186,9 @@ def _modes(body: BeamBody, field: StrainField, K: Real, M: Real) -> BeamModes:
     for own in sets:
         squares[own[1][0]], columns[own] = _polished(K[own], M[own], columns[own])
     # Frequencies that agree to nine digits count as equal, so that the order of the strains decides.
-    order = np.lexsort((strain, [float(f"{each:.8e}") for each in squares]))
+    order = np.lexsort((strain, [float(f"{square:.8e}") for square in squares]))
     columns, frequencies = columns[:, order], np.sqrt(squares[order])
-    turn, shift = (shape @ columns for shape in (each[field.gauss[-1]] for each in field.shapes()))
+    turn, shift = (shape @ columns for shape in (shape[field.gauss[-1]] for shape in field.shapes()))
     return BeamModes(columns * tip_signs(shift, body.length_m * turn), frequencies)
 
 
@@ -223,18 +223,20 @@ def _polished(K: Real, M: Real, X: Real) -> tuple[Real, Real]:
     """`refined` eigenpairs, unless the columns are further from X'M X = 1 then: where masses are all but singular,
     rounding errors of modes of nearly one frequency would turn them into each other."""
     values, better = refined(K, M, X)
-    lack, then = (float(np.max(np.abs(np.eye(len(M)) - each.T @ M @ each))) for each in (X, better))
+    lack, then = (float(np.max(np.abs(np.eye(len(M)) - transform.T @ M @ transform))) for transform in (X, better))
     return (values, better) if then <= max(lack, _GOOD) else (np.diag(X.T @ K @ X) / np.diag(X.T @ M @ X), X)
 
 
 def _uncoupled(strain: Index, K: Real, M: Real) -> list[Index]:
     """The coordinates of each set of strains that K and M couple by more than rounding; `strain` (m,): that of each."""
-    sizes = [np.sqrt(np.outer(np.diag(each), np.diag(each))) for each in (K, M)]
-    scaled = [np.abs(each) / np.where(size > 0.0, size, 1.0) for each, size in zip((K, M), sizes, strict=True)]
+    sizes = [np.sqrt(np.outer(np.diag(matrix), np.diag(matrix))) for matrix in (K, M)]
+    scaled = [np.abs(matrix) / np.where(size > 0.0, size, 1.0) for matrix, size in zip((K, M), sizes, strict=True)]
     names = np.unique(strain)
-    coupled = [[max(np.max(each[np.ix_(strain == a, strain == b)]) for each in scaled) for b in names] for a in names]
+    coupled = [
+        [max(np.max(matrix[np.ix_(strain == a, strain == b)]) for matrix in scaled) for b in names] for a in names
+    ]
     label = groups(np.array(coupled) > _UNCOUPLED)
-    return [np.flatnonzero(np.isin(strain, names[np.array(label) == each])) for each in dict.fromkeys(label)]
+    return [np.flatnonzero(np.isin(strain, names[np.array(label) == part])) for part in dict.fromkeys(label)]
 
 
 def _nodes_at(body: BeamBody) -> Real:
@@ -254,13 +256,13 @@ def _listed(body: BeamBody) -> list[tuple[str, float, Quaternion]]:
 def _nodes(body: BeamBody, field: StrainField, turn: Real, shift: Real) -> dict[str, FlexibleNode]:
     """Nodes by name: origin and root, which do not deform, tip and the listed ones, which are the last sections."""
     rigid = undeforming_node(field.mode_count)
-    found = {"origin": rigid, "root": replace(rigid)}
+    nodes = {"origin": rigid, "root": replace(rigid)}
     listed = _listed(body)
     first = len(field.x) - len(listed)
     _, rotation = rest_sections(body, field.x[first:])
     for i, (name, _, quaternion) in enumerate(listed):
         j = first + i
-        found[name] = FlexibleNode(
+        nodes[name] = FlexibleNode(
             field.position[j], rotation[i] @ rotation_matrix(quaternion), shift[j], turn[j], section=j
         )
-    return found
+    return nodes

@@ -70,7 +70,7 @@ def _rates(elements: BeamElements, columns: Real, x: Real) -> tuple[Real, Real]:
     """For pairs of modes (n,m,m,3): theta_2', and u_2' without theta_2 x e_x."""
     # The field is 1/2 eta' G eta: a term 1/2 a x b gives G the symmetric part of a x b, a term a x b twice that.
     theta = np.swapaxes(elements.motion(x, columns)[:, 3:], 1, 2)
-    strain, curvature = (np.swapaxes(each, 1, 2) for each in elements.strain(x, columns))
+    strain, curvature = (np.swapaxes(matrix, 1, 2) for matrix in elements.strain(x, columns))
     turning = _symmetric(np.cross(theta[:, :, None], curvature[:, None]))
     tilting = _symmetric(np.cross(theta[:, :, None], np.cross(theta, _X)[:, None]))
     return turning, tilting + 2.0 * _symmetric(np.cross(theta[:, :, None], strain[:, None]))

@@ -40,7 +40,7 @@ class SectionTable:
     @property
     def uniform(self) -> bool:
         """Whether all stations are alike."""
-        return all(bool(np.all(each == each[0])) for each in (self.stiffness, self.inertia, self.twist))
+        return all(bool(np.all(matrix == matrix[0])) for matrix in (self.stiffness, self.inertia, self.twist))
 
     @property
     def sheared(self) -> bool:
@@ -123,14 +123,14 @@ def section_table(body: BeamBody) -> SectionTable:
     except ValueError as error:
         raise ValueError(f"beam '{body.name}': {error}") from None
     if not sheared and body.level != "exact":  # whose strains may include shear in any theory
-        stiffness = np.array([_rigid_in_shear(each) for each in stiffness])
+        stiffness = np.array([_rigid_in_shear(matrix) for matrix in stiffness])
     plain = has_plain_sections(body)
     return SectionTable(np.array([station.x_m for station in stations], dtype=float), stiffness, inertia, plain, twist)
 
 
 def _rigid_in_shear(K: Real) -> Real:
     """The stiffness (6,6) of a section that cannot be sheared."""
-    found = np.zeros((6, 6))
-    found[np.ix_(WITHOUT_SHEAR, WITHOUT_SHEAR)] = without_shear(K)
-    found[SHEAR, SHEAR] = np.inf
-    return found
+    stiffness = np.zeros((6, 6))
+    stiffness[np.ix_(WITHOUT_SHEAR, WITHOUT_SHEAR)] = without_shear(K)
+    stiffness[SHEAR, SHEAR] = np.inf
+    return stiffness

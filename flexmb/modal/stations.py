@@ -45,9 +45,9 @@ class Stations:
 
     def matrices(self) -> Real:
         """Mass matrices (n,6,6) for [displacement; rotation] of the axis points."""
-        found: Real = inertia_matrices(self.mass, self.com, self.inertia)
-        found[:, 3, 3] += self.twist
-        return found
+        matrices: Real = inertia_matrices(self.mass, self.com, self.inertia)
+        matrices[:, 3, 3] += self.twist
+        return matrices
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ def section_masses(x: Real, inertia: Real, twist: Real, body: BeamBody, plain: b
 
 def lumps(body: BeamBody) -> tuple[Lump, ...]:
     """The tip masses of `body`. Raises ValueError for one without mass, or beyond the ends of the beam."""
-    found = []
+    parts = []
     for tip in body.tip_masses:
         inertia = np.array(tip.inertia_kg_m2, dtype=float)
         place = f"beam '{body.name}': tip mass at x = {tip.x_m:g} m"
@@ -131,5 +131,5 @@ def lumps(body: BeamBody) -> tuple[Lump, ...]:
             raise ValueError(f"{place} needs mass_kg > 0, got {tip.mass_kg:g}")
         if not 0.0 <= tip.x_m <= body.length_m:
             raise ValueError(f"{place} is not on [0, {body.length_m:g}] m")
-        found.append(Lump(tip.x_m, tip.mass_kg, np.array(tip.com_m, dtype=float), inertia))
-    return tuple(found)
+        parts.append(Lump(tip.x_m, tip.mass_kg, np.array(tip.com_m, dtype=float), inertia))
+    return tuple(parts)

@@ -138,9 +138,7 @@ def strain_field(body: BeamBody, places: Real, hung_from: Index | None = None) -
     h = x - left
     position, rotation = rest_sections(body, x)
     shapes = _Polynomials(body)
-    rows = np.stack(
-        [*_moments(body, left, h, shapes), rotation @ shapes.at(x)[:, :3]], axis=1
-    )
+    rows = np.stack([*_moments(body, left, h, shapes), rotation @ shapes.at(x)[:, :3]], axis=1)
     return StrainField(
         x=x,
         before=before,
@@ -166,14 +164,16 @@ class _Polynomials:
         inside = x if within is None else within
         piece = np.clip(np.searchsorted(self._edges, inside, side="right") - 1, 0, self._pieces - 1)
         xi = 2.0 * (x - self._edges[piece]) / np.diff(self._edges)[piece] - 1.0
-        found = np.zeros((len(x), 6, sum(self._counts.values()) * self._pieces))
+        fields_of_strains = np.zeros((len(x), 6, sum(self._counts.values()) * self._pieces))
         column = 0
         for strain, count in self._counts.items():
             values = np.polynomial.legendre.legvander(xi, count - 1)
-            for each in range(self._pieces):
-                found[:, STRAINS.index(strain), column : column + count] = values * (piece == each)[:, None]
+            for piece_number in range(self._pieces):
+                fields_of_strains[:, STRAINS.index(strain), column : column + count] = (
+                    values * (piece == piece_number)[:, None]
+                )
                 column += count
-        return found
+        return fields_of_strains
 
 
 def _moments(body: BeamBody, left: Real, h: Real, shapes: _Polynomials) -> Real:
@@ -184,10 +184,10 @@ def _moments(body: BeamBody, left: Real, h: Real, shapes: _Polynomials) -> Real:
     factors = 0.5 * w * np.array([1.0, 6.0, 30.0])[:, None] * np.polynomial.legendre.legvander(xi, 2).T
     points = left + 0.5 * h * (1.0 + xi[:, None])
     rotations = rest_sections(body, points.ravel())[1].reshape(*points.shape, 3, 3)
-    found = np.zeros((3, *shapes.at(left)[:, 3:].shape))
+    moments = np.zeros((3, *shapes.at(left)[:, 3:].shape))
     for x, rotation, factor in zip(points, rotations, factors.T, strict=True):
-        found += factor[:, None, None, None] * (h[:, None, None] * (rotation @ shapes.at(x, within=left)[:, 3:]))
-    return found
+        moments += factor[:, None, None, None] * (h[:, None, None] * (rotation @ shapes.at(x, within=left)[:, 3:]))
+    return moments
 
 
 def _grid(body: BeamBody) -> tuple[list[tuple[float, float, int]], Real, Real]:
@@ -205,9 +205,7 @@ def _grid(body: BeamBody) -> tuple[list[tuple[float, float, int]], Real, Real]:
         piece = np.searchsorted(ends, 0.5 * (left + right)) - 1
         share = (right - left) / (ends[piece + 1] - ends[piece])
         intervals.append((float(left), float(right), points_of_part(whole, share)))
-    gauss = np.concatenate(
-        [left + (right - left) / 2.0 * (1.0 + gauss_rule(n)[0]) for left, right, n in intervals]
-    )
+    gauss = np.concatenate([left + (right - left) / 2.0 * (1.0 + gauss_rule(n)[0]) for left, right, n in intervals])
     return intervals, gauss, breaks
 
 

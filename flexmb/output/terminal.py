@@ -22,8 +22,8 @@ class Terminal(Console):
     @property
     def size(self) -> ConsoleDimensions:
         """The size of the terminal; lines of unlimited width if the output is not a terminal."""
-        found = super().size
-        return found if self.file.isatty() else ConsoleDimensions(_UNLIMITED, found.height)
+        size = super().size
+        return size if self.file.isatty() else ConsoleDimensions(_UNLIMITED, size.height)
 
     @size.setter
     def size(self, new: tuple[int, int]) -> None:

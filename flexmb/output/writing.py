@@ -11,7 +11,7 @@ from pathlib import Path
 
 def check_folder(path: Path) -> None:
     """OSError, with the remedy, unless `path` is a writable folder or can be created; it is not created here."""
-    above = next(each for each in (path, *path.absolute().parents) if os.path.lexists(each))
+    above = next(folder for folder in (path, *path.absolute().parents) if os.path.lexists(folder))
     if not above.is_dir():
         raise OSError(errno.ENOTDIR, "this is not a folder, so no folder can be made in it: name another", str(above))
     if not os.access(above, os.W_OK | os.X_OK):

@@ -60,8 +60,8 @@ class BaseParameters(NamedTuple):
         Raises TypeError or ValueError for what is no such array of finite numbers.
         """
         Y = arguments.finite("Y", arguments.array("Y", Y))
-        found: Real = arguments.shaped("Y", Y, (*Y.shape[:-1], self.matrix.shape[1]))[..., self.chosen]
-        return found
+        matrix: Real = arguments.shaped("Y", Y, (*Y.shape[:-1], self.matrix.shape[1]))[..., self.chosen]
+        return matrix
 
     def fit(self, Y: Real, tau: Real, noise: Real | float | None = None) -> BaseFit:
         """Least squares for measured tau (n,), less what is known, with the rows of Y (n,P).
@@ -143,7 +143,7 @@ def _name(names: Sequence[str], row: Real, first: int) -> str:
 
 
 def _positive(noise: Real | float) -> Real:
-    found = arguments.array("noise", noise)
-    if not np.all(np.isfinite(found)) or not np.all(found > 0.0):
+    noise_sizes = arguments.array("noise", noise)
+    if not np.all(np.isfinite(noise_sizes)) or not np.all(noise_sizes > 0.0):
         raise ValueError("noise is a standard deviation: give positive numbers")
-    return found
+    return noise_sizes

@@ -73,22 +73,22 @@ def body_parameters(link: BodyLink, c: Constants, k: int) -> BodyParameters:
 
 def table_numbers(entries: list[Entry], c: Constants) -> Real:
     """The numbers at these places."""
-    return np.array([_number(each, c) for each in entries])
+    return np.array([_number(entry, c) for entry in entries])
 
 
 def without(entries: list[Entry], c: Constants) -> dict[str, Real]:
     """The tables that have these places, with zeros there."""
-    found = {name: _copied(getattr(c, name)) for name in _ARRAYS.values()} | {"body": c.body.copy()}
+    copies = {name: _copied(getattr(c, name)) for name in _ARRAYS.values()} | {"body": c.body.copy()}
     for table, k, i, j in entries:
         if table == RIGID:
-            found["body"]["rigid"][k, i] = 0.0
+            copies["body"]["rigid"][k, i] = 0.0
         elif table == MOMENT:
-            found["product"][c.body["product"][k], j // ROW, 0, i * ROW + j % ROW] = 0.0
+            copies["product"][c.body["product"][k], j // ROW, 0, i * ROW + j % ROW] = 0.0
         else:
-            found[_ARRAYS[table]][k, i, j] = 0.0
+            copies[_ARRAYS[table]][k, i, j] = 0.0
             if table in (MASS, STIFFNESS, DAMPING):
-                found[_ARRAYS[table]][k, j, i] = 0.0
-    return found
+                copies[_ARRAYS[table]][k, j, i] = 0.0
+    return copies
 
 
 _ARRAYS = {
@@ -198,5 +198,7 @@ class Places:
 
 def places(entries: list[Entry], c: Constants) -> Places:
     """The places of these entries."""
-    rows = [(each.table, each.body, int(c.body["product"][each.body]), each.first, each.second) for each in entries]
+    rows = [
+        (entry.table, entry.body, int(c.body["product"][entry.body]), entry.first, entry.second) for entry in entries
+    ]
     return Places(np.array(rows, np.int64).reshape(-1, 5))

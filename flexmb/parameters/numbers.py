@@ -21,19 +21,19 @@ class Number:
         """PathError where the scene has no such number, or what is there is no real number."""
         if not isinstance(name, str):
             raise TypeError(f"a parameter is named by a string, not by {name!r}: write a path such as rod.mass_kg")
-        found = list[float]()
+        values = list[float]()
 
         def look(value: Any) -> Any:
-            found.append(_real(value, name))
+            values.append(_real(value, name))
             return value
 
         changed_at(scene, name, look)
-        if len(set(found)) > 1:
+        if len(set(values)) > 1:
             raise PathError(
-                f'parameter "{name}" has the values {", ".join(f"{each:g}" for each in found[:4])}: name one of its '
+                f'parameter "{name}" has the values {", ".join(f"{value:g}" for value in values[:4])}: name one of its '
                 "places, or give all of them one value"
             )
-        self.name, self.value, self._scene = name, found[0], scene
+        self.name, self.value, self._scene = name, values[0], scene
 
     def scene_at(self, value: float) -> Scene:
         """The scene with another value."""
@@ -78,7 +78,7 @@ class Number:
         elif steps[-1].isdecimal():
 
             def look(value: Any) -> Any:
-                neighbours.extend(abs(each) for each in value if isinstance(each, float))
+                neighbours.extend(abs(number) for number in value if isinstance(number, float))
                 return value
 
             changed_at(self._scene, ".".join(steps[:-1]), look)
@@ -108,10 +108,10 @@ def numbers(scene: Scene, names: Sequence[str]) -> tuple[Number, ...]:
     """The numbers of these names; ValueError or TypeError where there is none, or one twice."""
     if isinstance(names, str):
         raise TypeError(f"parameters are a list of names, not the string {names!r}: write [{names!r}]")
-    found = tuple(Number(scene, name) for name in names)
-    if not found:
+    numbers = tuple(Number(scene, name) for name in names)
+    if not numbers:
         raise ValueError("no parameters are named: give at least one, such as rod.mass_kg")
-    twice = sorted({each.name for each in found if sum(other.name == each.name for other in found) > 1})
+    twice = sorted({number.name for number in numbers if sum(other.name == number.name for other in numbers) > 1})
     if twice:
         raise ValueError(f'parameter "{twice[0]}" is named twice: name it once')
-    return found
+    return numbers

@@ -80,21 +80,23 @@ class Parameters:
                 f'scene "{plant.scene.name}" has closures and bodies of level "ruthless", whose inertia is not where '
                 'closures join them: for derivatives use level "linear" or a better one'
             )
-        self.names, self.values = tuple(each.name for each in chosen), np.array([each.value for each in chosen])
+        self.names, self.values = tuple(number.name for number in chosen), np.array([number.value for number in chosen])
         self.values.flags.writeable = False
         self.plant = plant if plant.is_smooth and plant.closures is None else plant.with_numbers(plant.scene)
         """The same system, with equal functions of time kept apart: numbers of one may change without the other's."""
-        found = _Differentiation(self.plant, starts)
-        held = None if like is None else found.kept(like, chosen)
-        rates = found.by_all(chosen, {} if held is None else held.rates)
-        self._held, self._found, self._rates = held, found, rates
-        self.errors = np.array([each.error for each in rates])
-        self.reached = np.array([each.name in found.reached or bool(np.any(rate.values))
-                                 for each, rate in zip(chosen, rates, strict=True)])  # fmt: skip
-        self._of_tables: Real = np.array([each.values[: found.size] for each in rates]).reshape(-1, found.size).T
-        self.initial_state: Real = self._of_tables[-len(found.tables.start) :].copy()
-        for each in (self.errors, self.initial_state, self.reached):
-            each.flags.writeable = False
+        differentiation = _Differentiation(self.plant, starts)
+        held = None if like is None else differentiation.kept(like, chosen)
+        rates = differentiation.by_all(chosen, {} if held is None else held.rates)
+        self._held, self._found, self._rates = held, differentiation, rates
+        self.errors = np.array([rate.error for rate in rates])
+        self.reached = np.array([number.name in differentiation.reached or bool(np.any(rate.values))
+                                 for number, rate in zip(chosen, rates, strict=True)])  # fmt: skip
+        self._of_tables: Real = (
+            np.array([rate.values[: differentiation.size] for rate in rates]).reshape(-1, differentiation.size).T
+        )
+        self.initial_state: Real = self._of_tables[-len(differentiation.tables.start) :].copy()
+        for array in (self.errors, self.initial_state, self.reached):
+            array.flags.writeable = False
         self.own = Own()
 
     def __repr__(self) -> str:
@@ -161,14 +163,14 @@ class Parameters:
     def _slopes(self, t: float, y: Real, dy: Real) -> Real:
         """The same of arrays that fit."""
         self.plant.refuse_corners(t, y)
-        found = np.empty(dy.shape)
+        slopes = np.empty(dy.shape)
         for start, bound in self._bound:
             place = slice(start, start + bound.count)
             out, along = np.empty((len(y), LANES)), np.zeros((len(y), LANES))
             along[:, : bound.count] = dy[:, place]
             bound.check(bound.slopes(t, y, along, out))
-            found[:, place] = out[:, : bound.count]
-        return found
+            slopes[:, place] = out[:, : bound.count]
+        return slopes
 
     def evaluate(self, state: State) -> dict[str, Any]:
         """By name of the parameter, the derivatives of everything observable, in the form of `System.evaluate`.
@@ -177,34 +179,36 @@ class Parameters:
         """
         t, y = self.plant.layout.entering(state)
         self.plant.refuse_corners(t, y)
-        found = dict[str, Any]()
+        evaluations = dict[str, Any]()
         for start, bound in self._bound:
             bound.check(bound.observe(t, y))
             for lane in range(bound.count):
                 row = finite_result(bound.row(lane), t)
-                found[self.names[start + lane]] = self.plant.observation.evaluation(row + self._open(t, y))
-        return found
+                evaluations[self.names[start + lane]] = self.plant.observation.evaluation(row + self._open(t, y))
+        return evaluations
 
     def loads(self, state: State) -> dict[str, Real]:
         """d/dp (6,P) of the load [torque; force] across each hinge and closure on the outboard body, World axes."""
-        found = list(self.evaluate(state).values())
-        return {name: np.column_stack([each.loads[name] for each in found]) for name in found[0].loads}
+        loads = list(self.evaluate(state).values())
+        return {
+            name: np.column_stack([columns_of_part.loads[name] for columns_of_part in loads]) for name in loads[0].loads
+        }
 
     def inverse_dynamics(self, state: State, accelerations: Real) -> Real:
         """d tau/dp (nu,P) of tau = M udot + c of the tree for given accelerations (nu,)."""
         t, y = self.plant.layout.entering(state)
         rates = self.plant.layout.rates("accelerations", accelerations)
         self.plant.refuse_corners(t, y)
-        found = np.empty((self.plant.nu, len(self.names)))
+        forces = np.empty((self.plant.nu, len(self.names)))
         for start, bound in self._bound:
             bound.invert(t, y, rates)
-            found[:, start : start + bound.count] = bound.loads.tau[:, 1 : 1 + bound.count]
-        return finite_result(found, t)
+            forces[:, start : start + bound.count] = bound.loads.tau[:, 1 : 1 + bound.count]
+        return finite_result(forces, t)
 
     def workspace(self, block: ParameterBlock) -> Any:
         """A new workspace for kernels that take the constants of a block; one per thread. ValueError for others."""
         plant = self.plant
-        if not any(block is each for each in self.blocks):
+        if not any(block is other for other in self.blocks):
             raise ValueError("block: give one of the `blocks` of these parameters")
         return kernels.parameter_workspace(block.constants, plant.constants, plant.nq, plant.nu)
 
@@ -245,7 +249,7 @@ class _Bound:
     def row(self, lane: int) -> Real:
         """(width,) the derivatives of the last `observe` by the parameter of a lane."""
         parts = self._out.every, self._out.drives, self.loads.closures
-        row: Real = np.concatenate([each[..., 1 + lane].ravel() for each in parts])
+        row: Real = np.concatenate([part[..., 1 + lane].ravel() for part in parts])
         return row
 
     @per_thread
@@ -276,15 +280,15 @@ class _Bound:
 def parameters(plant: Plant, names: Sequence[str]) -> Parameters:
     """The parameters of these names; PathError where the scene has no such number, ParameterError where there is no
     derivative by it, or nothing in the motion depends on it."""
-    found = Parameters(plant, numbers(plant.scene, names))
-    for name, is_reached in zip(found.names, found.reached.tolist(), strict=True):
+    derivatives = Parameters(plant, numbers(plant.scene, names))
+    for name, is_reached in zip(derivatives.names, derivatives.reached.tolist(), strict=True):
         if not is_reached:
             raise ParameterError(
                 f'parameter "{name}": accelerations, loads and the initial state at given outputs of controllers do '
                 "not depend on it: leave it out; by numbers of controllers, sensors and events, derivatives are those "
                 "of runs: see `sensitivities`"
             )
-    return found
+    return derivatives
 
 
 _OF_TABLES = {
@@ -359,22 +363,22 @@ class _Differentiation:
 
     def by_all(self, chosen: Sequence[Number], known: Mapping[str, Derivative]) -> list[Derivative]:
         """The same for many numbers, some of which are known by name."""
-        asked = [each for each in chosen if each.name not in known]
+        asked = [number for number in chosen if number.name not in known]
         self._number = chosen[0] if chosen else None
 
         def tables(values: Mapping[str, float]) -> Real:
             return self._with(chosen[0], values) if values else self._middle
 
         found = iter(derivatives_together(tables, asked, self._parts, self.by, self._widths) if asked else ())
-        return [known[each.name] if each.name in known else next(found) for each in chosen]
+        return [known[number.name] if number.name in known else next(found) for number in chosen]
 
     def kept(self, like: Parameters, chosen: Sequence[Number]) -> Steady | None:
         """What is steady in tables of the same numbers at other values, None where they are not as predicted."""
         before = like.differentiation
-        if like.names != tuple(each.name for each in chosen) or before._structure != self._structure:
+        if like.names != tuple(number.name for number in chosen) or before._structure != self._structure:
             return None
         self._widths = {name: rate.width for name, rate in zip(like.names, like._rates, strict=True)}
-        if not like.steady.predicts(self._middle, {each.name: each.value for each in chosen}):
+        if not like.steady.predicts(self._middle, {number.name: number.value for number in chosen}):
             return None
         self.diagonal = np.minimum(self.diagonal, before.diagonal)
         return like.steady
@@ -396,23 +400,23 @@ class _Differentiation:
         """
         known = [self._firsts.get(name) for name in values]
         if all(first is not None and first.value == value for first, value in zip(known, values.values(), strict=True)):
-            found = self._middle.copy()
+            tables = self._middle.copy()
             for first in known:
                 assert first is not None  # none is
-                found[first.places] = first.entries
-            return found
-        found = self._at(number.scene_with(values))
+                tables[first.places] = first.entries
+            return tables
+        tables = self._at(number.scene_with(values))
         if len(values) == 1 and known[0] is None:
-            (name, value), places = next(iter(values.items())), np.flatnonzero(found != self._middle)
-            self._firsts[name] = First(value, places, found[places])
-        return found
+            (name, value), places = next(iter(values.items())), np.flatnonzero(tables != self._middle)
+            self._firsts[name] = First(value, places, tables[places])
+        return tables
 
     def _at(self, scene: Scene) -> Real:
         try:
             tables = _tables(self._plant.with_numbers(scene), self._starts)
         except DynamicsError as error:  # that closures cannot be closed, or have no dynamics, at such a value
             raise ValueError(str(error)) from None
-        changed = [name for name, each in structure(tables).items() if each != self._structure.get(name)]
+        changed = [name for name, part in structure(tables).items() if part != self._structure.get(name)]
         if changed:
             what = _OF_TABLES.get(changed[0], f"what the tables contain depends on it: {changed[0]}")
             raise ValueError(what)

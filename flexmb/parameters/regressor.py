@@ -45,14 +45,14 @@ class InertiaRegressor:
         self._plant = plant
         known = [link.name for link in links]
         chosen = known if bodies is None else [one_of("bodies", name, known) for name in bodies]
-        found = [body_parameters(links[known.index(name)], plant.constants, known.index(name)) for name in chosen]
-        self.names = tuple(name for each in found for name in each.names)
-        self._entries = [entry for each in found for entry in each.entries]
-        self._to_tables = [each.to_tables for each in found]
+        parameters = [body_parameters(links[known.index(name)], plant.constants, known.index(name)) for name in chosen]
+        self.names = tuple(name for rate in parameters for name in rate.names)
+        self._entries = [entry for rate in parameters for entry in rate.entries]
+        self._to_tables = [rate.to_tables for rate in parameters]
         numbers, start, values = table_numbers(self._entries, plant.constants), 0, list[Real]()
-        for each in self._to_tables:
-            values.append(np.linalg.solve(each, numbers[start : start + len(each)]))
-            start += len(each)
+        for table in self._to_tables:
+            values.append(np.linalg.solve(table, numbers[start : start + len(table)]))
+            start += len(table)
         self.values: Real = np.concatenate(values) if values else np.zeros(0)
         self.values.flags.writeable = False
         self._without = replace(plant.constants, **without(self._entries, plant.constants))
@@ -64,20 +64,20 @@ class InertiaRegressor:
     def at(self, state: State, accelerations: Real) -> Real:
         """Y (nu,P) for accelerations (nu,)."""
         t, y, rates = self._given(state, accelerations)
-        found = np.empty((self._plant.nu, len(self.names)))
-        self._evaluate(t, y, rates, found)
+        rows = np.empty((self._plant.nu, len(self.names)))
+        self._evaluate(t, y, rates, rows)
         start = 0
-        for each in self._to_tables:
-            place = slice(start, start + len(each))
-            found[:, place] = found[:, place] @ each
-            start += len(each)
-        return finite_result(found, t)
+        for table in self._to_tables:
+            place = slice(start, start + len(table))
+            rows[:, place] = rows[:, place] @ table
+            start += len(table)
+        return finite_result(rows, t)
 
     def stacked(self, states: Sequence[State], accelerations: Sequence[Real] | Real) -> Real:
         """(n nu,P) Y of n states with accelerations (n,nu), one above the other."""
         if len(states) != len(accelerations) or not len(states):
             raise ValueError(f"{len(states)} states and {len(accelerations)} accelerations: give as many, at least one")
-        return np.concatenate([self.at(*each) for each in zip(states, accelerations, strict=True)])
+        return np.concatenate([self.at(*pair) for pair in zip(states, accelerations, strict=True)])
 
     def base(self, states: Sequence[State], accelerations: Sequence[Real] | Real) -> BaseParameters:
         """The combinations of parameters that motions through these states, with accelerations (n,nu), can determine.
@@ -103,7 +103,7 @@ class InertiaRegressor:
     def _evaluate(self) -> Direct:
         """(t, y, rates, Y)."""
         plant, c = self._plant, self._plant.constants
-        duals = {each.name: as_duals(getattr(c, each.name)) for each in fields(c)}
+        duals = {field.name: as_duals(getattr(c, field.name)) for field in fields(c)}
         duals["moves"][..., 0] = 1.0  # no column is left out, because it may get a derivative
         dual = DualConstants(**duals)
         w = tangent_workspace(c, plant.nq, plant.nu)

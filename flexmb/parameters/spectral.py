@@ -41,12 +41,12 @@ class Parts(NamedTuple):
 
     def sizes(self, values: Real) -> Real:
         """(n,) the size of the part of each entry, with these values, or that of its table if the part is zero."""
-        found = np.zeros(len(values))
+        sizes = np.zeros(len(values))
         for part in self.places:
             own = np.max(np.abs(values[part]), initial=0.0)
             table = 0.0 if self.whole is None else np.max(self.whole[part], initial=0.0)
-            found[part] = own if own > ROUNDING * table else table
-        return found
+            sizes[part] = own if own > ROUNDING * table else table
+        return sizes
 
 
 class NotSmooth(ValueError):
@@ -79,12 +79,13 @@ def derivative(
         except ValueError as error:  # that the value is outside of its range: a smaller interval may not be
             trouble = str(error)
             continue
-        best = min(best, found._replace(width=width), key=lambda each: each.error)
+        best = min(best, found._replace(width=width), key=lambda estimate: estimate.error)
         if best.error <= ENOUGH or found.error <= LARGEST and settled:
             break
     if not best.error <= LARGEST:
         raise NotSmooth(
-            trouble if best.error == np.inf
+            trouble
+            if best.error == np.inf
             else f"it is known to {best.error:.1g} of its size only: there is a kink, frequencies nearly cross, or the "
             "effect of the number drowns in rounding"
         )
@@ -117,7 +118,7 @@ def _on_interval(
             jump = sum(weight * even[place] for place, weight in zip(places, _rest(intervals), strict=True)) / width
             rounding = parts.sizes(size) * (ROUNDING / scale + MAGNIFIED / width)
             earlier = error
-            error = max(_relative(each, now, rounding, parts.places) for each in (now - before, jump))
+            error = max(_relative(change, now, rounding, parts.places) for change in (now - before, jump))
             is_slow = is_hasty and error ** (INTERVALS[-1] / intervals) > ENOUGH
             if error <= ENOUGH or is_slow or intervals == INTERVALS[-2] and error > HOPELESS:
                 break

@@ -44,7 +44,7 @@ class Steady(NamedTuple):
     def predicts(self, middle: Real, values: Mapping[str, float]) -> bool:
         """Whether the tables at other values are what the derivatives make of them, which then hold there too."""
         change = sum(
-            (each.values * (values[name] - self.values[name]) for name, each in self.rates.items()),
+            (rate.values * (values[name] - self.values[name]) for name, rate in self.rates.items()),
             np.zeros_like(middle),
         )
         off = np.abs(middle - self.middle - change)
@@ -67,13 +67,13 @@ def steady(
     taken = np.zeros(len(middle), np.int64)
     for name in values:
         taken[firsts[name].places] += 1
-    found = {
+    rates_of = {
         name: rate
         for (name, value), rate in zip(values.items(), rates, strict=True)
         if np.all(taken[firsts[name].places] == 1) and _is_linear(middle, sizes, value, firsts[name], rate)
     }
     changing = np.zeros(len(middle), bool)
-    others = {name: firsts[name].value for name in values if name not in found}
+    others = {name: firsts[name].value for name in values if name not in rates_of}
     for name in others:
         changing[firsts[name].places] = True
     try:
@@ -81,11 +81,11 @@ def steady(
         together = tables({name: firsts[name].value for name in values})
     except ValueError:
         return none
-    for name in found:
+    for name in rates_of:
         expected[firsts[name].places] = firsts[name].entries
     if np.any(np.abs(together - expected) > LINEAR * sizes):
         return none
-    return Steady(dict(values), found, middle, sizes, changing)
+    return Steady(dict(values), rates_of, middle, sizes, changing)
 
 
 def _is_linear(middle: Real, sizes: Real, value: float, first: First, rate: Derivative) -> bool:

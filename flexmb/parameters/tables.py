@@ -132,13 +132,13 @@ def moments(tables: Tables, weights: Tables) -> list[Real]:
     masses that stand for all others moves (`flexmb.modal.equivalent`), then has seven digits, and so has G there. What
     motions depend on are these integrals, which have all digits but for sum m G G, whose part there is arbitrary.
     """
-    found = []
+    moments = []
     modes = weights.tree.point_mode[:, 3:]
     for points, rows in _summed(weights.tree):
         of = weights.tree.point[points]
         one = np.column_stack([np.ones(len(of)), of["position"], modes[points].reshape(len(of), -1)])
-        found.append(np.tensordot(one * of["mass"][:, None], tables.tree.second_shape["translation"][rows], (0, 0)))
-    return [each.ravel() for each in found]
+        moments.append(np.tensordot(one * of["mass"][:, None], tables.tree.second_shape["translation"][rows], (0, 0)))
+    return [array.ravel() for array in moments]
 
 
 def _summed(tree: Constants) -> list[tuple[Index, Index]]:
@@ -154,15 +154,15 @@ def _summed(tree: Constants) -> list[tuple[Index, Index]]:
 
 def structure(tables: Tables) -> dict[str, Any]:
     """Everything else that the kernels depend on: the shapes of the tables, and their integers."""
-    found = dict[str, Any]()
+    arrays = dict[str, Any]()
     for kind, table in (("tree", tables.tree), ("closures", tables.closures)):
         for each in () if table is None else fields(table):
             array = getattr(table, each.name)
-            found[f"{kind}.{each.name}"] = array.shape
+            arrays[f"{kind}.{each.name}"] = array.shape
             for field in _fields_of(array.dtype, np.int64):
                 if field is not None and field not in _DIAGONAL:
-                    found[f"{kind}.{each.name}.{field}"] = array[field].tobytes()
-    return found
+                    arrays[f"{kind}.{each.name}.{field}"] = array[field].tobytes()
+    return arrays
 
 
 def diagonal(tables: Tables) -> Real:
@@ -179,14 +179,14 @@ def blocks(tables: Tables, is_diagonal: Real, names: Sequence[str], rates: Real)
     for field, values in zip(sorted(_DIAGONAL), is_diagonal, strict=True):
         body[field] = values
     tree = replace(tables.tree, body=body)
-    found = [
+    blocks = [
         _block(tables._replace(tree=tree), tuple(names[first : first + LANES]), rates[:, first : first + LANES])
         for first in range(0, len(names), LANES)
     ]
-    broaden([each.constants for each in found])
+    broaden([dual.constants for dual in blocks])
     if tables.closures is not None:
-        broaden([each.closures for each in found])
-    return tuple(found)
+        broaden([dual.closures for dual in blocks])
+    return tuple(blocks)
 
 
 def _block(tables: Tables, names: tuple[str, ...], rates: Real) -> ParameterBlock:
@@ -210,18 +210,18 @@ def put(block: ParameterBlock, before: Tables, now: Tables, is_diagonal: Real, r
     False where this does not do: what workspaces have copies of must stay, and the features of the kernels suffice.
     """
     old, new, wide = before.tree, now.tree, block.constants
-    changed = [each.name for each in fields(new)
-               if getattr(new, each.name).tobytes() != getattr(old, each.name).tobytes()]  # fmt: skip
+    changed = [field.name for field in fields(new)
+               if getattr(new, field.name).tobytes() != getattr(old, field.name).tobytes()]  # fmt: skip
     lanes = [(column.table.removeprefix("tree."), column.field, each)
              for column, each in _with_rates(now, rates, moving)]  # fmt: skip
     own = slice(1, 1 + rates.shape[1])
     if not (
         now.closures is None
         and _COPIED.isdisjoint(changed)
-        and all(np.array_equal(_of(wide, name, field)[..., own], each)
-                for name, field, each in lanes if name in _COPIED)
-        and all(np.array_equal(wide.body[field], each)
-                for field, each in zip(sorted(_DIAGONAL), is_diagonal, strict=True))
+        and all(np.array_equal(_of(wide, name, field)[..., own], rate)
+                for name, field, rate in lanes if name in _COPIED)
+        and all(np.array_equal(wide.body[field], flags)
+                for field, flags in zip(sorted(_DIAGONAL), is_diagonal, strict=True))
     ):  # fmt: skip
         return False
     for each in fields(new):
@@ -255,4 +255,4 @@ def _with_rates(tables: Tables, rates: Real, moving: Flags) -> Iterator[tuple[Ta
 
 
 def _duals(table: Constants | ClosureConstants | None) -> dict[str, Any]:
-    return {} if table is None else {each.name: as_duals(getattr(table, each.name)) for each in fields(table)}
+    return {} if table is None else {field.name: as_duals(getattr(table, field.name)) for field in fields(table)}

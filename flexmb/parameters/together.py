@@ -32,15 +32,15 @@ def derivatives_together(
 ) -> list[Derivative]:  # fmt: skip
     """d tables/dp (n,) for each of these numbers; `by` finds it for one number, or says what is wrong with it. widths:
     those at which derivatives were found nearby, by name."""
-    concerned = [_concerned(tables, each) for each in chosen]
-    found = dict[int, Derivative]()
+    concerned = [_concerned(tables, number) for number in chosen]
+    derivatives = dict[int, Derivative]()
     for group in _groups(concerned):
-        found |= _linear(tables, chosen, concerned, group, parts)
-        left = [k for k in group if k not in found]
+        derivatives |= _linear(tables, chosen, concerned, group, parts)
+        left = [k for k in group if k not in derivatives]
         if len(left) > 1:
             first = min(widths.get(chosen[k].name, WIDTHS[0]) for k in left)
-            found |= _of_group(tables, chosen, concerned, left, parts, first)
-    return [found[k] if k in found else by(each) for k, each in enumerate(chosen)]
+            derivatives |= _of_group(tables, chosen, concerned, left, parts, first)
+    return [derivatives[k] if k in derivatives else by(number) for k, number in enumerate(chosen)]
 
 
 def _concerned(tables: Tables, number: Number) -> Flags | None:
@@ -53,19 +53,19 @@ def _concerned(tables: Tables, number: Number) -> Flags | None:
 
 def _groups(concerned: Sequence[Flags | None]) -> list[list[int]]:
     """Numbers with no entry in common, each added to the first group that it fits in."""
-    found = list[list[int]]()
+    groups = list[list[int]]()
     taken = list[Flags]()
     for k, own in enumerate(concerned):
         if own is None:
             continue
         place = next((i for i, other in enumerate(taken) if not np.any(own & other)), None)
         if place is None:
-            found.append([k])
+            groups.append([k])
             taken.append(own)
         else:
-            found[place].append(k)
+            groups[place].append(k)
             taken[place] = taken[place] | own
-    return found
+    return groups
 
 
 def _linear(
@@ -108,18 +108,16 @@ def _of_group(
         return tables({chosen[k].name: chosen[k].value + share * chosen[k].scale for k in group} if share else {})
 
     try:
-        rates = derivative(at, 0.0, 1.0, parts._replace(places=[each for each in places if len(each)]), first)
+        rates = derivative(at, 0.0, 1.0, parts._replace(places=[place for place in places if len(place)]), first)
     except (NotSmooth, ValueError):
         return {}
     strays = np.where(np.any(list(own.values()), axis=0), 0.0, np.abs(rates.values))
     if any(np.any(strays[part] > allowed[part]) for part in parts.places):
         return {}
-    return {
-        k: rates._replace(values=np.where(mask, rates.values / chosen[k].scale, 0.0)) for k, mask in own.items()
-    }
+    return {k: rates._replace(values=np.where(mask, rates.values / chosen[k].scale, 0.0)) for k, mask in own.items()}
 
 
 def _within(mask: Flags, part: slice | Index) -> Flags:
-    found = np.zeros(len(mask), bool)
-    found[part] = mask[part]
-    return found
+    flags = np.zeros(len(mask), bool)
+    flags[part] = mask[part]
+    return flags

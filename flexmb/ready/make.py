@@ -79,8 +79,8 @@ def _made(folder: Path, processes: int, processor: str, first: bool) -> list[Pat
             with whole_file(folder / file.name) as place:
                 shutil.copyfile(file, place)
     spent = dict[str, float]()
-    for each in used:
-        for name, seconds in each.spent.items():
+    for use in used:
+        for name, seconds in use.spent.items():
             spent[name] = spent.get(name, 0.0) + seconds
     before = described(folder).get("seconds", {})
     seconds = before | {name: round(found, 1) for name, found in spent.items() if found >= WORTH_NOTING}
@@ -96,7 +96,7 @@ def _made(folder: Path, processes: int, processor: str, first: bool) -> list[Pat
 
 
 def _refuse_failures(used: Iterable[Used]) -> None:
-    failed = [each.name for each in used if each.trouble]
+    failed = [use.name for use in used if use.trouble]
     if failed:
         raise RuntimeError(f"uses that failed, whose kernels may be missing: {'; '.join(failed)}")
 
@@ -108,8 +108,8 @@ def _run(names: Sequence[str], processes: int, made: Path) -> tuple[list[Used], 
         left = {pool.submit(_use, name): name for name in names}
         while left:
             done = wait(left, SILENCE, FIRST_COMPLETED).done
-            for each in done:
-                used.append(_result(each, left.pop(each)))
+            for process in done:
+                used.append(_result(process, left.pop(process)))
                 name, seconds, trouble, _ = used[-1]
                 _say(f"{len(used):3d} of {len(names)}  {seconds:6.1f} s  {name}{trouble}")
             if not done:

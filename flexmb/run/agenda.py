@@ -40,7 +40,7 @@ class Agenda:
         are replaced by the names of these."""
         scene = self.situation.system.scene
         names = watchable(scene) if scene.events else {}
-        self.events = tuple(structs.replace(each, watch=names.get(each.watch, each.watch)) for each in scene.events)
+        self.events = tuple(structs.replace(event, watch=names.get(event.watch, event.watch)) for event in scene.events)
 
     @property
     def _armed(self) -> list[SceneEvent]:

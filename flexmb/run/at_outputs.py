@@ -19,10 +19,10 @@ def systems_at(run: RunArrays, made_by: Making) -> Iterator[System]:
         now = system_at(made_by, t)
         if now is not before or (now.signals and i == 0):
             before, system = now, _apart(now) if now.signals else now
-        for number, each in system.signals.items():
-            at = named(each.source)
+        for number, signal in system.signals.items():
+            at = named(signal.source)
             assert at is not None  # the scene was checked
-            system.constants.function["data"][number, 0] = each.gain * run.signals[at.name][i, at.number or 0]
+            system.constants.function["data"][number, 0] = signal.gain * run.signals[at.name][i, at.number or 0]
         yield system
 
 

@@ -39,7 +39,11 @@ def computed(system: System, seconds: float, what: str = RECURSION) -> None:
     Not for closed chains and scenes with laws of users, and not where somebody has chosen kernels; see `is_off`.
     """
     c, scene = system.constants, system.scene
-    if c.kernels[0] != BY_ITSELF or scene.constraints or any(isinstance(each, UserLaw) for each in scene.controllers):
+    if (
+        c.kernels[0] != BY_ITSELF
+        or scene.constraints
+        or any(isinstance(controller, UserLaw) for controller in scene.controllers)
+    ):
         return
     features = system.kept.get(RECURSION) or system.kept.setdefault(RECURSION, contained(c))
     key = features, what

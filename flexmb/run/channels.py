@@ -66,28 +66,28 @@ def channels_of(trajectory: Recorded) -> dict[str, Real]:
     Torque and force, angular and linear parts are separate channels, so that no norm mixes units. The total energy is
     the sum of the kinds that the engine reports. "work" is the work done on the system, if the engine integrates it.
     """
-    found: dict[str, Real] = {}
+    channels: dict[str, Real] = {}
     for name, path in trajectory.markers.items():
-        found[f"marker:{name}.position"] = path.position
-        found[f"marker:{name}.orientation"] = path.quaternion
-        found[f"marker:{name}.angular_velocity"] = path.velocity[:, :3]
-        found[f"marker:{name}.velocity"] = path.velocity[:, 3:]
+        channels[f"marker:{name}.position"] = path.position
+        channels[f"marker:{name}.orientation"] = path.quaternion
+        channels[f"marker:{name}.angular_velocity"] = path.velocity[:, :3]
+        channels[f"marker:{name}.velocity"] = path.velocity[:, 3:]
     on_bodies = ("load", trajectory.loads), ("wheel_load", trajectory.wheel_loads), ("connector", trajectory.connectors)
     for prefix, loads in on_bodies:
         for name, load in loads.items():
-            found[f"{prefix}:{name}.torque"] = load[:, :3]
-            found[f"{prefix}:{name}.force"] = load[:, 3:]
+            channels[f"{prefix}:{name}.torque"] = load[:, :3]
+            channels[f"{prefix}:{name}.force"] = load[:, 3:]
     for prefix, along in (("drive", trajectory.drives), ("hinge_force", trajectory.hinge_forces)):
-        found |= {f"{prefix}:{name}": values.reshape(len(values), -1) for name, values in along.items()}
+        channels |= {f"{prefix}:{name}": values.reshape(len(values), -1) for name, values in along.items()}
     if trajectory.momentum is not None:
-        found["momentum.angular"] = trajectory.momentum[:, :3]
-        found["momentum.linear"] = trajectory.momentum[:, 3:]
-    found |= {f"energy.{kind}": energy[:, None] for kind, energy in trajectory.energy.items()}
+        channels["momentum.angular"] = trajectory.momentum[:, :3]
+        channels["momentum.linear"] = trajectory.momentum[:, 3:]
+    channels |= {f"energy.{kind}": energy[:, None] for kind, energy in trajectory.energy.items()}
     if trajectory.energy:
-        found["energy.total"] = np.sum([energy[:, None] for energy in trajectory.energy.values()], axis=0)
+        channels["energy.total"] = np.sum([energy[:, None] for energy in trajectory.energy.values()], axis=0)
     if trajectory.work is not None:
-        found["work"] = trajectory.work[:, None]
-    return found
+        channels["work"] = trajectory.work[:, None]
+    return channels
 
 
 @lru_cache(maxsize=2**16)  # a harness session calls this a million times with a few thousand distinct arguments

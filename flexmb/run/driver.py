@@ -199,9 +199,9 @@ class Driver:
 
     def _jumped(self, raw: Raw) -> list[SceneEvent]:
         """Events on outputs of sampled controllers that jumped at the end of the run."""
-        found: list[SceneEvent] = []
+        events: list[SceneEvent] = []
         if raw.controllers is None:
-            return found
+            return events
         with self._situation.integration() as solve:
             assert solve.feedback is not None
             for event in self._agenda.watched:
@@ -209,14 +209,14 @@ class Driver:
                     height = raw.controllers.signal[solve.feedback.place_of(event.watch)] - event.level
                     side, direction = self._sides.side[event.name], DIRECTIONS[event.crossing]
                     if side in (-1, 1) and side * height < -self._sides.near(event) and side * direction <= 0:
-                        found.append(event)
-        return found
+                        events.append(event)
+        return events
 
     def _over_after_events(self, instant: AfterEvents) -> Trajectory:
         """End the run at an instant of events: controllers that are due act after these, and events on the controllers'
         outputs follow."""
         raw, ends = instant
-        if any(each.period_s for each in self._situation.system.scene.controllers):
+        if any(controller.period_s for controller in self._situation.system.scene.controllers):
             with self._situation.integration() as solve:
                 assert solve.feedback is not None
                 known = solve.feedback.look(self._situation.going_on(raw), acts=True, anew=True)

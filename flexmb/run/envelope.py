@@ -52,7 +52,7 @@ class Extremes:
 
 def part_of_extremes(found: Extremes, place: slice) -> Extremes:
     """Those of some of the scalars."""
-    return Extremes(*(getattr(found, each.name)[place] for each in fields(Extremes)))
+    return Extremes(*(getattr(found, field.name)[place] for field in fields(Extremes)))
 
 
 def merged(a: Extremes, b: Extremes) -> Extremes:
@@ -70,7 +70,7 @@ def _padded(found: Extremes, k: int) -> Extremes:
     missing = k - len(found.least)
     if not missing:
         return found
-    arrays = (getattr(found, each.name) for each in fields(Extremes))
+    arrays = (getattr(found, field.name) for field in fields(Extremes))
     return Extremes(*(np.pad(array, (0, missing), constant_values=np.nan) for array in arrays))
 
 
@@ -86,13 +86,13 @@ def columns_of(arrays: Iterable[tuple[Kind, str, Real]]) -> dict[Key, Real]:
 
 def magnitudes_of(columns: Mapping[Key, Real]) -> dict[str, Real]:
     """By channel, the Euclidean norms (T,1) of all vectors."""
-    found = {}
+    magnitudes = {}
     for (kind, name), values in columns.items():
         prefix, channels = VECTORS.get(kind, ("", ()))
         for i, channel in enumerate(channels):
             x, y, z = values[:, 3 * i : 3 * i + 3].T
-            found[f"{prefix}:{name}.{channel}"] = np.hypot(np.hypot(x, y), z)[:, None]
-    return found
+            magnitudes[f"{prefix}:{name}.{channel}"] = np.hypot(np.hypot(x, y), z)[:, None]
+    return magnitudes
 
 
 @dataclass(frozen=True)
@@ -149,8 +149,8 @@ _PARTS = parts_of(
 
 def _rows(channels: Iterable[tuple[str, str, Extremes]]) -> Iterator[list[str | float]]:
     for name, unit, found in channels:
-        numbers = (getattr(found, each.name)[0] for each in fields(Extremes))
-        yield [name, unit, *(float(each) for each in numbers)]
+        numbers = (getattr(found, field.name)[0] for field in fields(Extremes))
+        yield [name, unit, *(float(number) for number in numbers)]
 
 
 class PartialEnvelope:
@@ -185,7 +185,7 @@ def envelope(run: RunArrays, parts: Sequence[PartialEnvelope]) -> Envelope:
     channels += [(name, units[name.rpartition(".")[2]], found) for name, found in whole.magnitudes.items()]
 
     def of(kind: Kind) -> dict[str, Extremes]:
-        return {name: found for (each, name), found in whole.columns.items() if each == kind}
+        return {name: found for (kind_of_load, name), found in whole.columns.items() if kind_of_load == kind}
 
     return Envelope(
         t_start=float(run.t[0]), t_end=run.stopped_at, steps=whole.steps,

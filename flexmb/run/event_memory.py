@@ -55,7 +55,7 @@ def written(memory: EventMemory | None) -> dict[str, Any]:
 def read(file: Mapping[str, Any]) -> EventMemory:
     """What a file contains, not yet validated; KeyError for a missing array, ValueError for one of the wrong form."""
     side, came, passed, *numbers, given = (file[name] for name in NAMES)
-    until, anew, shown = (each.item() for each in numbers)
+    until, anew, shown = (number.item() for number in numbers)
     if anew not in (0, 1):
         raise ValueError(f"{_KEY}anew is {anew:g}, but must be 0 or 1")
     scene = msgspec.json.decode(given.tobytes(), type=Scene)

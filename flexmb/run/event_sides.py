@@ -37,7 +37,7 @@ class Sides:
     def take(self, watched: Sequence[SceneEvent], side: Index, came: Index) -> None:
         """Copy sides from a `Watch`, whose entries are in the order of `watched`."""
         names = [event.name for event in watched]
-        self.side, self.came = (dict(zip(names, each.tolist(), strict=True)) for each in (side, came))
+        self.side, self.came = (dict(zip(names, column.tolist(), strict=True)) for column in (side, came))
 
     def remember(self, anew: bool) -> EventMemory | None:
         """The present state of all events of the scene, for a restart; see `EventMemory` for `anew`."""
@@ -47,7 +47,7 @@ class Sides:
         side = [1 if name in agenda.done else self.side.get(name, 0) for name in names]
         came = [self.came.get(name, 0) for name in names]
         passed = [int(name in agenda.passed) for name in names]
-        whole = (np.array(each, np.int64) for each in (side, came, passed))
+        whole = (np.array(column, np.int64) for column in (side, came, passed))
         return EventMemory(*whole, agenda.until, anew, 0, self.situation.given)
 
     def recall(self, memory: EventMemory) -> None:

@@ -81,7 +81,7 @@ def dataset(trajectory: RunArrays) -> xarray.Dataset:
     xarray)."""
     with _optional("xarray"):
         import xarray
-    found: dict[str, Any] = {}
+    variables: dict[str, Any] = {}
     for name, units, values in _channels(trajectory):
         if name.startswith("drive:"):
             dimension, labels = f"{name}.coordinate", None
@@ -89,10 +89,10 @@ def dataset(trajectory: RunArrays) -> xarray.Dataset:
             dimension, labels = AXES.get(values.shape[1], ("", None))
         scalar = labels is None and values.shape[1] == 1
         dims = ("t",) if scalar else ("t", dimension)
-        found[name] = (dims, values[:, 0] if scalar else values, {"units": units})
+        variables[name] = (dims, values[:, 0] if scalar else values, {"units": units})
     coordinates = {name: list(labels) for name, labels in AXES.values()}
     time = ("t", trajectory.t, {"units": "s"})
-    return xarray.Dataset(found, coords={"t": time, **coordinates}, attrs={"scene": trajectory.scene})
+    return xarray.Dataset(variables, coords={"t": time, **coordinates}, attrs={"scene": trajectory.scene})
 
 
 def write_recording(trajectory: RunArrays, path: Path) -> None:

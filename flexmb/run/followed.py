@@ -124,7 +124,7 @@ class FollowedRun:
             inside = (steps.breaks > steps.ends[first]) & (steps.breaks <= steps.ends[last])
             group = Steps(steps.ends[first : last + 1], steps.leap[first:last], steps.breaks[inside])
             panels = _fixed_panels(group) if self._settings.integrator.fixed else _panels(group)
-            times = np.unique(np.concatenate([[begin.state.t], *(each.ravel() for each in panels)]))
+            times = np.unique(np.concatenate([[begin.state.t], *(panel.ravel() for panel in panels)]))
             raw = integrate(solve, begin, times, self._settings, breaks=last < N, goes_on=True)
             _check(solve, raw.status, raw.t, raw.interrupted)
             yield from self._seen(solve, raw, times, panels, group)
@@ -146,10 +146,10 @@ class FollowedRun:
         run, known = self._observed(solve, raw, t, states)
         renumbered = np.cumsum(known) - 1
         steps, left_out = len(group.ends) - 1, int(np.sum(~known))
-        for each in panels:
-            places = where[np.searchsorted(times, each)]
-            ends_at = np.searchsorted(group.breaks, each[:, -1])
-            jumps = np.isin(each[:, -1], group.breaks)
+        for panel in panels:
+            places = where[np.searchsorted(times, panel)]
+            ends_at = np.searchsorted(group.breaks, panel[:, -1])
+            jumps = np.isin(panel[:, -1], group.breaks)
             places[jumps, -1] = where[len(times) + ends_at[jumps]]
             whole = np.all(known[places], axis=1) & np.all(np.diff(t[places], axis=1) > 0.0, axis=1)
             yield part_of(run, renumbered[places[whole]], steps, left_out)
@@ -182,7 +182,7 @@ def _panels(group: Steps) -> list[Real]:
     every = start + s * (end - start)
     every[:, -1:] = end  # not as rounded
     distinct = np.all(np.diff(every, axis=1) > 0.0, axis=1) & ~group.leap
-    return [each for each in (every[distinct], every[~distinct][:, [0, -1]]) if len(each)]
+    return [part for part in (every[distinct], every[~distinct][:, [0, -1]]) if len(part)]
 
 
 def _fixed_panels(group: Steps) -> list[Real]:
@@ -193,7 +193,7 @@ def _fixed_panels(group: Steps) -> list[Real]:
         for i in range(a, b, TOGETHER):
             row = np.arange(i, min(i + TOGETHER, b) + 1)
             rows.setdefault(len(row), []).append(row)
-    return [group.ends[np.array(each)] for each in rows.values()]
+    return [group.ends[np.array(row)] for row in rows.values()]
 
 
 def _check(solve: Integration, status: int, t: float, interrupted: bool) -> None:

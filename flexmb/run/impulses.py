@@ -71,7 +71,7 @@ def struck(system: System, state: State, speeds: Mapping[int, float]) -> Struck:
     if rows is None:
         return Struck(u, dict(zip(places, held.tolist(), strict=True)), energy, {})
     others = np.linalg.svd(half / size)[2][rank:] / size  # impulses that change no speed
-    changes = [rows.wrenches(each[len(places) :]) for each in others]
+    changes = [rows.wrenches(other[len(places) :]) for other in others]
     wrenches = np.array(changes).reshape(len(others), len(system.scene.constraints), 6)
     rounding = SAME * float(np.max(np.abs(others), initial=0.0))
     closures = _determined(rows.wrenches(impulses[len(places) :]), wrenches, rounding)

@@ -77,7 +77,7 @@ def _of_some(first: RunArrays, later: RunArrays, kept: int, key: str) -> dict[st
     missing = np.nan if key == "signals" else 0.0
     a, b, found = getattr(first, key), getattr(later, key), {}
     for name in {**a, **b}:
-        width = max(each[name].shape[1] for each in (a, b) if name in each)
+        width = max(outputs[name].shape[1] for outputs in (a, b) if name in outputs)
         parts = []
         for values, count in ((a, kept), (b, len(later.t))):
             part = np.full((count, width), missing)

@@ -125,9 +125,9 @@ class BatchRun:
         """Run LANES copies at once; those that end with a status that is not in _DECIDED are left for single runs."""
         w, s, entries, _ = tables
         place = slice(first, first + LANES)
-        found = Runs(*(part[place] for part in self._found))
+        runs = Runs(*(part[place] for part in self._found))
         ends = self._copies_ends(range(first, first + LANES))
-        s.y[...] = found.y.T
+        s.y[...] = runs.y.T
         constants = self._batch.constants(first // LANES, w)
         problem = lane_problem(lanes.rhs, lanes.project, s, constants, w)
         if record is not None:
@@ -135,26 +135,26 @@ class BatchRun:
             for lane, kept in enumerate(self._block_of(self._kept, first)):
                 fastest.slow[lane] = np.inf if kept is None else kept.slow
             problem = recorded_lanes(problem, record, self._times)
-        if first_derivative(problem, s, entries, self._times[0], found.counts) != OK or w.doubt[0]:
-            self._examine(first, found.status)
+        if first_derivative(problem, s, entries, self._times[0], runs.counts) != OK or w.doubt[0]:
+            self._examine(first, runs.status)
         accuracy = self._settings.accuracy(self._batch.nq, self._batch.nu)
         if self._settings.method == "dop853":
-            ends = [np.unique(each) for each in ends]
+            ends = [np.unique(end) for end in ends]
             most = max(map(len, ends))
-            padded = np.array([[*each, *[each[-1]] * (most - len(each))] for each in ends])
+            padded = np.array([[*end, *[end[-1]] * (most - len(end))] for end in ends])
             lengths = np.array(list(map(len, ends)))
             control: LaneControl = lane_control(lengths)
             clock = Clock(self._times, padded)
-            dop853_lanes(problem, s, entries, control, clock, accuracy, found.out, found.counts)
+            dop853_lanes(problem, s, entries, control, clock, accuracy, runs.out, runs.counts)
             status, stopped_at = control.status, control.t
         else:
-            if any(len(each) != len(ends[0]) or np.any(each != ends[0]) for each in ends):
+            if any(len(end) != len(ends[0]) or np.any(end != ends[0]) for end in ends):
                 return
-            end, t = rk4_lanes(problem, s, entries, Clock(self._times, ends[0]), accuracy, found.out, found.counts)
+            end, t = rk4_lanes(problem, s, entries, Clock(self._times, ends[0]), accuracy, runs.out, runs.counts)
             status = np.where(np.isfinite(s.y).all(axis=0), end, _NOT_YET)
             stopped_at = np.full(LANES, t)
-        for lane in np.flatnonzero((found.status == _NOT_YET) & np.isin(status, _DECIDED)):
-            found.status[lane], found.stopped_at[lane] = status[lane], stopped_at[lane]
+        for lane in np.flatnonzero((runs.status == _NOT_YET) & np.isin(status, _DECIDED)):
+            runs.status[lane], runs.stopped_at[lane] = status[lane], stopped_at[lane]
         if record is not None and not np.isnan(fastest.state[..., 0]).all():
             self._look_at(first, tables, constants, fastest)
 
@@ -253,10 +253,10 @@ class Alone:
             return whole(y, clock, accuracy, out, counts, memory(len(y)), watch)
         begin = Beginning(self._own.layout.known(float(clock.times[0]), y), y, None)
         y, clock, accuracy = whole.begin(begin, clock, accuracy, counts)
-        found = np.empty((len(out), len(y)))
-        status, t = whole(y, clock, accuracy, found, counts, memory(len(y)), watch)
+        rows = np.empty((len(out), len(y)))
+        status, t = whole(y, clock, accuracy, rows, counts, memory(len(y)), watch)
         whole.ended(None)
-        out[:, :-1], out[:, -1] = found[:, : out.shape[1] - 1], found[:, -1]
+        out[:, :-1], out[:, -1] = rows[:, : out.shape[1] - 1], rows[:, -1]
         return status, t
 
     @property

@@ -101,7 +101,7 @@ def _named(system: System, t: float, values: Values) -> State:
     for name, value in values.items():
         if name not in places:
             raise ValueError(
-                f"state: scene \"{system.scene.name}\" has no coordinate or speed {name!r}: {closest(name, places)} "
+                f'state: scene "{system.scene.name}" has no coordinate or speed {name!r}: {closest(name, places)} '
                 f"There are {', '.join(sorted(places))}"
             )
         place, called = places[name], f'state["{name}"]'
@@ -112,9 +112,9 @@ def _named(system: System, t: float, values: Values) -> State:
             raise ValueError(f"{called} is {value}, but another name gives the same coordinates other values")
         y[place], given[place] = numbers, True
     _, whole = system.layout.whole(t, y)
-    found = system.admissible(system.layout.known(t, whole), given)
-    _refuse_other_than_prescribed(system, whole, found, given)
-    return found
+    state = system.admissible(system.layout.known(t, whole), given)
+    _refuse_other_than_prescribed(system, whole, state, given)
+    return state
 
 
 def names_of_places(system: System) -> dict[str, slice]:

@@ -121,7 +121,7 @@ def _basis(s: Real, at: Real) -> Real:
     ahead = at[:, :, None] - s[:, None, :]
     on = ahead == 0.0
     terms = weight[:, None, :] / np.where(on, 1.0, ahead)
-    found = terms / np.sum(terms, axis=2, keepdims=True)
+    basis = terms / np.sum(terms, axis=2, keepdims=True)
     at_node = on.any(axis=2, keepdims=True)
-    result: Real = np.where(at_node, on.astype(float), found)
+    result: Real = np.where(at_node, on.astype(float), basis)
     return result

@@ -137,7 +137,7 @@ def _drives(trajectory: RunArrays, figure: Figure) -> float:
 
 def _size(*values: Real) -> float:
     """The largest absolute value that is finite; 0 where there is none."""
-    return max((float(np.max(np.abs(each), initial=0.0, where=np.isfinite(each))) for each in values), default=0.0)
+    return max((float(np.max(np.abs(value), initial=0.0, where=np.isfinite(value))) for value in values), default=0.0)
 
 
 def _magnitude(vectors: Real) -> Real:

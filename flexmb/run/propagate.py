@@ -220,15 +220,15 @@ def integration(
     route = system.route(algorithm, stabilise)
     spare: list[Integration] = system.kept.setdefault((Integration, algorithm, integrator.name, route.beginning), [])
     try:
-        found = spare.pop()
-        found.forget()
+        record = spare.pop()
+        record.forget()
     except IndexError:
         if system.scene.controllers:  # they write into functions of time, so the system must not be shared
             system = copy(system)
             route = system.route(algorithm, stabilise)
-        found = Integration(system, algorithms.chosen(algorithm), route, integrator)
-    yield found
-    spare.append(found)
+        record = Integration(system, algorithms.chosen(algorithm), route, integrator)
+    yield record
+    spare.append(record)
 
 
 def unmoved(begin: Beginning, status: Status = Status.OK, fault: int = 0) -> Raw:

@@ -34,7 +34,7 @@ class Making:
 
 def system_at(made_by: Making, t: float) -> System:
     """The system that the output of a run at a time (s) is of."""
-    later = bisect_right(made_by.altered, t, key=lambda each: each[0])
+    later = bisect_right(made_by.altered, t, key=lambda entry: entry[0])
     return made_by.altered[later - 1][1] if later else made_by.system
 
 
@@ -55,13 +55,13 @@ def error_estimate(trajectory: RunArrays, made_by: Making) -> dict[str, Real]:
     second = made_by.again(settings)
     other, together = channels_of(second), min(len(trajectory.t), len(second.t))
     common = int(np.sum(trajectory.t[:together] == second.t[:together]))  # an event may end the runs at other times
-    found = {}
+    errors = {}
     for name, values in channels_of(trajectory).items():
         apart = np.full(len(values), np.nan)
         if name in other and other[name].shape[1:] == values.shape[1:]:
             apart[:common] = share * distance(name, values[:common], other[name][:common])
-        found[name] = apart
-    return found
+        errors[name] = apart
+    return errors
 
 
 def _tighter(given: Settings) -> tuple[Settings, float]:

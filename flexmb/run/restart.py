@@ -114,7 +114,7 @@ class Restart:
 
     def taken_up(self) -> Memory:
         """A copy of the memory, marked for an integrator that resumes from it."""
-        copy = Memory(*(each.copy() for each in self.memory))
+        copy = Memory(*(array.copy() for array in self.memory))
         copy.numbers[TAKEN_UP] = 1.0
         return copy
 
@@ -145,12 +145,12 @@ def _memory(method: Any, t: Any, given: Memory) -> tuple[float, Memory]:
     chosen, t = integrator(method), arguments.number("t", t)
     y = _row("y", given.y)
     rows = len(y) + 3 if chosen.keeps_jacobian else 0
-    found = Memory(
+    memory = Memory(
         _finite("numbers", given.numbers, (NUMBERS,)), _finite("y", y, y.shape),
         _finite("rows", given.rows, (rows, len(y))),
     )  # fmt: skip
-    _refuse_other_numbers(found.numbers, t)
-    return t, found
+    _refuse_other_numbers(memory.numbers, t)
+    return t, memory
 
 
 def _controllers(given: LoopMemory) -> LoopMemory:
@@ -186,10 +186,10 @@ def _refuse_other_numbers(numbers: Real, t: float) -> None:
 
 
 def _row(name: str, values: Any) -> Real:
-    found = arguments.array(name, values)
-    if found.ndim != 1:
-        raise ValueError(f"{name} has the shape {found.shape}, but must be a row of numbers")
-    return found
+    row = arguments.array(name, values)
+    if row.ndim != 1:
+        raise ValueError(f"{name} has the shape {row.shape}, but must be a row of numbers")
+    return row
 
 
 def _finite(name: str, values: Any, shape: tuple[int, ...]) -> Real:

@@ -45,8 +45,8 @@ class MarkerPath:
         See `flexmb.scene.angles.angles_of`.
         """
         refuse_torn_path("path", self)
-        found = angles_of(self.quaternion, sequence)
-        return Angles(np.unwrap(found.values, axis=0), found.singular)
+        angles = angles_of(self.quaternion, sequence)
+        return Angles(np.unwrap(angles.values, axis=0), angles.singular)
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ class RunArrays:
         """The scale (J) to which a drift of energy is compared: the largest change of work or of any kind of energy, or
         the largest kinetic energy."""
         refuse_torn(self)
-        changes = [float(np.ptp(each)) for each in (self.work, *self.energy.values())]
+        changes = [float(np.ptp(energies)) for energies in (self.work, *self.energy.values())]
         return max(*changes, float(np.max(self.energy["kinetic"])))
 
     @property
@@ -274,10 +274,10 @@ def refuse_torn_path(name: str, path: Any, times: int | None = None) -> None:
 
 
 def _named(run: RunArrays, name: str) -> dict[str, Any]:
-    found = getattr(run, name)
-    if not isinstance(found, dict):
-        raise TypeError(f"{name} is a {type(found).__name__}: give arrays by name")
-    return found
+    value = getattr(run, name)
+    if not isinstance(value, dict):
+        raise TypeError(f"{name} is a {type(value).__name__}: give arrays by name")
+    return value
 
 
 def _vector(name: str, unit: str) -> list[tuple[str, str]]:

@@ -238,9 +238,9 @@ def _looked_at(system: System, made: _Made) -> tuple[Trajectory, list[Warning], 
     failed = not trajectory.finished
     seen = WatchedStates(system, t, q, u, lambda n: system.turns(float(t[n]), q[n], u[n]), failed, trajectory.loads)
     seen = seen._replace(fastest=np.vstack(fastest)) if fastest and not failed else seen
-    for each in said(seen):
-        warned = [*warned, SceneWarning(f'scene "{system.scene.name}": {each}')]
-        trajectory = replace(trajectory, message=f"{trajectory.message}; {each}")
+    for finding in said(seen):
+        warned = [*warned, SceneWarning(f'scene "{system.scene.name}": {finding}')]
+        trajectory = replace(trajectory, message=f"{trajectory.message}; {finding}")
     return trajectory, warned, was_interrupted
 
 
@@ -253,7 +253,7 @@ def _again(stage: RunPart, state: Given, algorithm: Algorithm, stabilise: float,
 
 def refuse_without_jacobian(system: System, algorithm: Algorithm, method: Method) -> None:
     """NotImplementedError if a method that needs Jacobians is used where there are none."""
-    others = " or ".join(f'"{name}"' for name, each in INTEGRATORS.items() if not each.linearises)
+    others = " or ".join(f'"{name}"' for name, integrator in INTEGRATORS.items() if not integrator.linearises)
     if system.closures is not None and system.closures.at_rest:
         raise NotImplementedError(
             f'method "{method}" needs Jacobians, which are not available for closed chains with a body of level '

@@ -115,14 +115,14 @@ class Situation:
         arriving, at = y.copy(), self._instant(raw.t, y)
         for action in event.actions:
             self._do(action, at)
-        found = [_recorded(event.name, at, self._state(at.t, at.y))]
+        records = [_recorded(event.name, at, self._state(at.t, at.y))]
         self._become(self._off_stop(event), at)
         for action in event.actions:
             if isinstance(action, Impact) and action.rests:
                 push = -int(np.sign(self.speed(action.coordinate, arriving)))
                 if self._is_spent(action.coordinate, push, raw, y):
-                    found.append(self.rest(event, action, push, raw.t, y))
-        return found
+                    records.append(self.rest(event, action, push, raw.t, y))
+        return records
 
     def rest(self, event: SceneEvent, impact: Impact, push: int, t: float, y: Real) -> EventRecord:
         """Stop the coordinate of an impact and hold it on its stop, until an event releases it before the stop would
@@ -190,15 +190,15 @@ class Situation:
     def _strike(self, at: EventInstant, name: str, factor: float) -> None:
         """Apply an impulse that multiplies the speed of a coordinate by `factor`."""
         y, nq = at.y, self.system.nq
-        rates = {self._rate_place(each): each for each in self._paths}
+        rates = {self._rate_place(path): path for path in self._paths}
         place = self._rate_place(name)
-        found = struck(self.system, self._state(at.t, at.y), {place - nq: factor * y[place]})
-        y[nq:-1] = found.u
-        y[-1] += found.energy
-        for j, impulse in found.impulses.items():
+        state = struck(self.system, self._state(at.t, at.y), {place - nq: factor * y[place]})
+        y[nq:-1] = state.u
+        y[-1] += state.energy
+        for j, impulse in state.impulses.items():
             along = rates[nq + j]
             at.impulses[along] = at.impulses.get(along, 0.0) + impulse
-        for closure, wrench in found.closures.items():
+        for closure, wrench in state.closures.items():
             at.closures[closure] = at.closures.get(closure, 0.0) + wrench
 
     def _hold(self, at: EventInstant, name: str, leaving_stop: SceneEvent | None = None) -> None:
@@ -219,9 +219,9 @@ class Situation:
     def _off_stop(self, event: SceneEvent) -> Scene:
         """The scene after an event: without it, if it was one that released a coordinate from its stop."""
         scene = self.system.scene
-        if event.name not in {leaving(each) for each, _ in resting(scene)}:
+        if event.name not in {leaving(connector) for connector, _ in resting(scene)}:
             return scene
-        return replace(scene, events=tuple(each for each in scene.events if each.name != event.name))
+        return replace(scene, events=tuple(candidate for candidate in scene.events if candidate.name != event.name))
 
     def _become(self, scene: Scene, at: EventInstant) -> None:
         if scene == self.system.scene:
@@ -253,16 +253,16 @@ def _recorded(name: str, at: EventInstant, after: State) -> EventRecord:
 
 def _found(scene: Scene, path: str) -> Coordinate | Wheel:
     """The coordinate or wheel at a path of a scene."""
-    found: list[Coordinate | Wheel] = []
-    changed_at(scene, path, lambda item: found.append(item) or item)
-    return found[0]
+    items: list[Coordinate | Wheel] = []
+    changed_at(scene, path, lambda item: items.append(item) or item)
+    return items[0]
 
 
 def with_stops(system: System) -> System:
     """The system with sensors for the loads of all stops on which a coordinate may come to rest."""
     known = {sensor.name for sensor in system.scene.sensors}  # the scene of a resumed run has these sensors already
     sensors = [stop_sensor(event, action) for event, action in resting(system.scene)]
-    missing = [each for each in sensors if each.name not in known]
+    missing = [sensor for sensor in sensors if sensor.name not in known]
     if not missing:
         return system
     with asking(kernels_of(system)):

@@ -58,16 +58,16 @@ def simulate_stages(
     refuse_unknown("simulate_stages", settings)
     scenes = _scenes(scene, stages)
     t, times = start_time(t_start, state), list[Real]()
-    for i, (stage, each) in enumerate(zip(stages, scenes, strict=True)):
+    for i, (stage, scene_of_stage) in enumerate(zip(stages, scenes, strict=True)):
         start, t = t, t + stage.duration_s
-        if i and each is scenes[i - 1]:
-            check_run(each, t, start)
+        if i and scene_of_stage is scenes[i - 1]:
+            check_run(scene_of_stage, t, start)
         else:
-            check_and_warn(each, t, start)
+            check_and_warn(scene_of_stage, t, start)
         times.append(sample_times(stage.samples, t, start))
     chosen = Settings(method, **settings).checked(max(abs(times[0][0]), abs(t)))
-    for each, own in zip(scenes, times, strict=True):
-        refuse_large_run(each, len(own), chosen, algorithm)
+    for scene_of_stage, own in zip(scenes, times, strict=True):
+        refuse_large_run(scene_of_stage, len(own), chosen, algorithm)
     parts = [RunPart(system, own) for system, own in zip(_systems(scenes), times, strict=True)]
     return run_stages(parts, state, chosen, algorithm, stabilise)
 
@@ -76,27 +76,27 @@ def _scenes(scene: Scene, stages: Sequence[RunStage]) -> list[Scene]:
     """The scenes of all stages; one that does not change is the same object. ValueError for a duration that is none."""
     if not stages:
         raise ValueError("there are no stages: give at least one")
-    found: list[Scene] = []
+    scenes: list[Scene] = []
     for i, stage in enumerate(stages):
         if arguments.number(f"stages[{i}].duration_s", stage.duration_s) <= 0.0:
             raise ValueError(f"stages[{i}] lasts {stage.duration_s:g} s: give a positive duration")
-        if found and found[-1].events:
+        if scenes and scenes[-1].events:
             raise NotImplementedError(
                 f"stages[{i - 1}] has events, which change its scene: use events on time in place of later stages"
             )
         scene = (stage.scene or scene).with_values(stage.values)
-        found.append(found[-1] if found and found[-1] == scene else scene)
-    return found
+        scenes.append(scenes[-1] if scenes and scenes[-1] == scene else scene)
+    return scenes
 
 
 def _systems(scenes: Sequence[Scene]) -> list[System]:
     """The systems of checked scenes, each built once; ValueError if they do not fit each other."""
-    found: list[System] = []
+    systems: list[System] = []
     for i, scene in enumerate(scenes):
-        found.append(found[-1] if i and scene is scenes[i - 1] else assembled(scene))
+        systems.append(systems[-1] if i and scene is scenes[i - 1] else assembled(scene))
         for what, names in (("coordinates", 0), ("speeds", 1)):
-            strange = set(found[i].state_names[names]) ^ set(found[0].state_names[names])
+            strange = set(systems[i].state_names[names]) ^ set(systems[0].state_names[names])
             if strange:
                 listed = ", ".join(sorted(name for name, _ in strange))
                 raise ValueError(f"stages[{i}] has other {what} than stages[0]: {listed}")
-    return found
+    return systems

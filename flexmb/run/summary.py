@@ -63,25 +63,25 @@ class Peak(NamedTuple):
 
 def _peaks(trajectory: Trajectory, envelope: Envelope) -> dict[str, Peak]:
     """By channel, of what loads a structure."""
-    found = {}
+    peaks = {}
     for name, values in channels_of(trajectory).items():
         kind, _, of = name.partition(":")
         if name in envelope.magnitudes and kind in _LOADS:
-            each = envelope.magnitudes[name]
-            found[name] = Peak(float(each.greatest[0]), float(each.t_greatest[0]), _largest(values))
+            magnitude = envelope.magnitudes[name]
+            peaks[name] = Peak(float(magnitude.greatest[0]), float(magnitude.t_greatest[0]), _largest(values))
         elif kind in ("drive", "hinge_force"):
-            each = (envelope.drives if kind == "drive" else envelope.hinge_forces)[of]
-            for i, size in enumerate(each.largest):
-                t = each.t_greatest[i] if each.greatest[i] == size else each.t_least[i]
-                label = name if len(each.largest) == 1 else f"{name}[{i}]"
-                found[label] = Peak(float(size), float(t), _largest(values[:, i : i + 1]))
-    return found
+            magnitude = (envelope.drives if kind == "drive" else envelope.hinge_forces)[of]
+            for i, size in enumerate(magnitude.largest):
+                t = magnitude.t_greatest[i] if magnitude.greatest[i] == size else magnitude.t_least[i]
+                label = name if len(magnitude.largest) == 1 else f"{name}[{i}]"
+                peaks[label] = Peak(float(size), float(t), _largest(values[:, i : i + 1]))
+    return peaks
 
 
 def _largest(values: Real) -> float:
     """The largest norm of rows, NaN if none is known."""
-    found = norms(values)
-    return float(np.nanmax(found)) if np.isfinite(found).any() else float("nan")
+    sizes = norms(values)
+    return float(np.nanmax(sizes)) if np.isfinite(sizes).any() else float("nan")
 
 
 def _loads(trajectory: Trajectory) -> list[tuple[str, str]]:
@@ -127,12 +127,12 @@ def _rows(trajectory: Trajectory) -> list[tuple[str, Text | str]]:
 
 def _undetermined(trajectory: Trajectory) -> str:
     """Components of loads that redundant closures leave undetermined, as "pin (torque x, y; force z)"."""
-    found = []
+    names = []
     for name, is_open in trajectory.undetermined.items():
-        letters = [[axis for axis, each in zip("xyz", is_open[i : i + 3], strict=False) if each] for i in (0, 3)]
+        letters = [[axis for axis, is_axis in zip("xyz", is_open[i : i + 3], strict=False) if is_axis] for i in (0, 3)]
         parts = [f"{part} {', '.join(axes)}" for part, axes in zip(("torque", "force"), letters, strict=True) if axes]
-        found.append(f"{name} ({'; '.join(parts)})" if name in trajectory.loads else name)
-    return ", ".join(found)
+        names.append(f"{name} ({'; '.join(parts)})" if name in trajectory.loads else name)
+    return ", ".join(names)
 
 
 def _events(trajectory: Trajectory) -> str:

@@ -36,14 +36,14 @@ class Timing(NamedTuple):
 
     def turns(self, t_start: float, t_end: float) -> list[float]:
         """Extremes of sines and knots of tables in (t_start, t_end): between them functions rarely turn twice."""
-        found = {time for time in self.knots if t_start < time < t_end}
+        times = {time for time in self.knots if t_start < time < t_end}
         for sine in self.sines:
             half, phase = np.pi / abs(sine.angular_frequency_rad_s), sine.phase_rad / sine.angular_frequency_rad_s
             first, last = np.ceil((t_start + phase) / half - 0.5), np.floor((t_end + phase) / half - 0.5)
             if last - first <= MOST_TURNS:
                 extremes = (np.arange(first, last + 1.0) + 0.5) * half - phase
-                found.update(extremes[(extremes > t_start) & (extremes < t_end)].tolist())
-        return sorted(found)
+                times.update(extremes[(extremes > t_start) & (extremes < t_end)].tolist())
+        return sorted(times)
 
 
 def timing(scene: Scene) -> Timing:
@@ -85,12 +85,12 @@ def segment_ends(system: System, t_start: float, t_end: float, equal_steps: bool
     If events watch signals, segments also end where functions turn: error control resolves the motion only, and a load
     on a body that is held varies without any motion.
     """
-    found = timing_of(system)
-    ends, is_switch = found.between(t_start, t_end), breaks or t_end in found.switches
+    timing = timing_of(system)
+    ends, is_switch = timing.between(t_start, t_end), breaks or t_end in timing.switches
     if equal_steps:
         return np.array([*ends, *[t_end] * is_switch, inf])
     if watches_signals(system.scene):
-        ends = sorted({*ends, *found.turns(t_start, t_end)})
+        ends = sorted({*ends, *timing.turns(t_start, t_end)})
     return np.array([*ends, t_end, *[t_end] * is_switch])
 
 
@@ -107,6 +107,6 @@ def clock_of(system: System, t_start: float, times: Real, equal_steps: bool, bre
 
 def refuse_times(system: System, t_start: float, t_end: float) -> None:
     """SceneError unless t_start < t_end are finite and every profile covers the run."""
-    found = timing_of(system)
-    if not max(found.start, -1e300) <= t_start < t_end <= min(found.end, 1e300):
+    timing = timing_of(system)
+    if not max(timing.start, -1e300) <= t_start < t_end <= min(timing.end, 1e300):
         check_run(system.scene, t_end, t_start)

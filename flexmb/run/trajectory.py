@@ -82,8 +82,8 @@ class Trajectory(RunArrays):
         refuse_torn(self)
         if not self._is_followed:
             raise ValueError("the envelope needs a trajectory as simulate made it: use the trajectory of each run")
-        found = [part for way in self.ways for part in way.parts(way.until)]
-        return envelope(self, [part_of(self, np.zeros((0, 2), np.int64)), *found])
+        parts = [part for way in self.ways for part in way.parts(way.until)]
+        return envelope(self, [part_of(self, np.zeros((0, 2), np.int64)), *parts])
 
     @property
     def _is_followed(self) -> bool:

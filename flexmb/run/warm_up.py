@@ -75,19 +75,19 @@ def warm_up(
     """
     for what, names, known in (
         ("method", methods, INTEGRATORS), ("algorithm", algorithms, RUNNING),
-        ("scene", [each for each in scenes if not isinstance(each, Scene)], SCENES),
+        ("scene", [scene for scene in scenes if not isinstance(scene, Scene)], SCENES),
     ):  # fmt: skip
         for name in names:
             arguments.one_of(what, name, known)
     start = perf_counter()
-    for each in scenes:
-        if isinstance(each, Scene):
+    for scene in scenes:
+        if isinstance(scene, Scene):
             with asking("special"):
-                system = _compile(each, "closed" if each.constraints else "tree", methods, algorithms)
+                system = _compile(scene, "closed" if scene.constraints else "tree", methods, algorithms)
             note_warm(contained(system.constants))
         else:
             with asking("general"):
-                _compile(SCENES[each](), each, methods, algorithms)
+                _compile(SCENES[scene](), scene, methods, algorithms)
     return perf_counter() - start
 
 

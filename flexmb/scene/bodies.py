@@ -207,7 +207,7 @@ class BeamBody(SceneStruct, frozen=True, kw_only=True, tag="beam", tag_field="ki
         """A place that rounding has put beside an end of the beam is that end."""
         try:
             near = {
-                key: tuple(_at_end(each, self.length_m) for each in getattr(self, key))
+                key: tuple(_at_end(item, self.length_m) for item in getattr(self, key))
                 for key in ("stations", "tip_masses", "nodes")
             }
         except (AttributeError, TypeError):  # values of other types, which checks name with their places

@@ -20,9 +20,9 @@ def gauss_rule(points: int) -> tuple[Real, Real]:
 @lru_cache(maxsize=256)
 def _coefficients(points: int) -> Real:
     """(points,points), read-only: Legendre's coefficients of the polynomial through values at the Gauss points."""
-    found = np.asarray(np.linalg.inv(np.polynomial.legendre.legvander(gauss_rule(points)[0], points - 1)), float)
-    found.flags.writeable = False
-    return found
+    coefficients = np.asarray(np.linalg.inv(np.polynomial.legendre.legvander(gauss_rule(points)[0], points - 1)), float)
+    coefficients.flags.writeable = False
+    return coefficients
 
 
 def partial_integrals(xi: Real, points: int) -> Real:

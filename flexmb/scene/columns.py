@@ -35,7 +35,7 @@ def column(structs: Sequence[Any], key: str, *shape: int) -> Real:
 
 def alike(items: Sequence[Any]) -> list[Alike]:
     """The items of a collection and all structs inside them, grouped by kind."""
-    found: list[Alike] = []
+    groups: list[Alike] = []
     waiting: list[tuple[Sequence[int], Sequence[Any]]] = [(range(len(items)), items)]
     while waiting:
         owners, structs = waiting.pop()
@@ -43,9 +43,9 @@ def alike(items: Sequence[Any]) -> list[Alike]:
         for kind in dict.fromkeys(kinds):
             at = range(len(kinds)) if kinds.count(kind) == len(kinds) else [i for i, k in enumerate(kinds) if k is kind]
             group = Alike(kind, [owners[i] for i in at], [structs[i] for i in at])
-            found.append(group)
+            groups.append(group)
             waiting += [inner for key in struct_keys(kind) if (inner := _inside(group, key))[0]]
-    return found
+    return groups
 
 
 def _inside(group: Alike, key: str) -> tuple[list[int], list[Any]]:

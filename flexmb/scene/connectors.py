@@ -178,5 +178,5 @@ def by_stem(connector: Connector) -> dict[str, Any]:
 
 def actuator(connector: SpringDamper | HingeSpring) -> Function | None:
     """What its actuator does over time."""
-    found: Function | None = getattr(connector, connector.ACTUATOR)
-    return found
+    function: Function | None = getattr(connector, connector.ACTUATOR)
+    return function

@@ -81,9 +81,9 @@ def label(collection: str, item: Any) -> str:
 
 def _array_to_list(value: Any) -> Any:
     if hasattr(value, "tolist"):
-        found = value.tolist()
-        if type(found) is not type(value):
-            return found
+        values = value.tolist()
+        if type(values) is not type(value):
+            return values
         if isinstance(value, Real):  # numpy has no plain number for one of extended precision
             return float(value)
     raise TypeError(f"a scene cannot hold a {type(value).__name__}")
@@ -125,9 +125,9 @@ def _below(node: inspect.Type, step: str | int, value: Any) -> inspect.Type:
         below = node.item_types[min(step, len(node.item_types) - 1)]
     below = bare(below)
     if isinstance(below, inspect.UnionType):
-        structs = [each for each in below.types if isinstance(each, inspect.StructType)]
+        structs = [kind for kind in below.types if isinstance(kind, inspect.StructType)]
         tag = value.get("kind") if isinstance(value, dict) else None
-        chosen = [each for each in structs if each.tag == tag or len(structs) == 1]
+        chosen = [struct for struct in structs if struct.tag == tag or len(structs) == 1]
         return chosen[0] if chosen else below
     return below
 
@@ -153,7 +153,7 @@ def _remedy(what: str, place: Place, value: Any, node: inspect.Type) -> str:
 
 def _tags(node: inspect.Type) -> str:
     types = node.types if isinstance(node, inspect.UnionType) else (node,)
-    return ", ".join(str(each.tag) for each in types if isinstance(each, inspect.StructType) and each.tag)
+    return ", ".join(str(kind.tag) for kind in types if isinstance(kind, inspect.StructType) and kind.tag)
 
 
 def _unknown_key(word: str, node: inspect.StructType) -> str:

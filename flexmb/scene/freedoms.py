@@ -47,14 +47,14 @@ class _ScalarCoordinate(SceneStruct, frozen=True, kw_only=True):
     @property
     def effort(self) -> Function | None:
         """The motor (N m or N)."""
-        found: Function | None = getattr(self, self.KEYS.effort)
-        return found
+        function: Function | None = getattr(self, self.KEYS.effort)
+        return function
 
     @property
     def prescribed(self) -> Function | None:
         """The prescribed value (rad or m)."""
-        found: Function | None = getattr(self, self.KEYS.prescribed)
-        return found
+        function: Function | None = getattr(self, self.KEYS.prescribed)
+        return function
 
     @property
     def spring(self) -> tuple[float, float, float]:

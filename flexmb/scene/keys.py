@@ -75,17 +75,17 @@ def fields(kind: type[msgspec.Struct]) -> tuple[inspect.Field, ...]:
 
 def kinds(root: type[msgspec.Struct]) -> list[type[msgspec.Struct]]:
     """A kind of struct and all kinds inside it, in the order of their first appearance."""
-    found: dict[type[msgspec.Struct], None] = {}
+    kinds: dict[type[msgspec.Struct], None] = {}
 
     def look(kind: type[msgspec.Struct]) -> None:
-        if kind not in found:
-            found[kind] = None
+        if kind not in kinds:
+            kinds[kind] = None
             for part in chain.from_iterable(parts(field.type) for field in fields(kind)):
                 if isinstance(part.type, inspect.StructType):
                     look(part.type.cls)
 
     look(root)
-    return list(found)
+    return list(kinds)
 
 
 @cache

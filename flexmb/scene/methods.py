@@ -31,8 +31,8 @@ def angular(
     See AngularCoordinate: `angle` (rad), `rate` (rad/s), `stiffness` (N m/rad, ≥ 0),
     `damping` (N m s/rad, ≥ 0), `rest` (rad), `armature` (kg m², ≥ 0).
     """
-    found: s.AngularCoordinate = make(s.AngularCoordinate, **locals())
-    return found
+    coordinate: s.AngularCoordinate = make(s.AngularCoordinate, **locals())
+    return coordinate
 
 
 @known_keywords
@@ -46,8 +46,8 @@ def linear(
     See LinearCoordinate: `position` (m), `rate` (m/s), `stiffness` (N/m, ≥ 0), `damping` (N s/m, ≥ 0),
     `rest` (m), `armature` (kg, ≥ 0).
     """
-    found: s.LinearCoordinate = make(s.LinearCoordinate, **locals())
-    return found
+    coordinate: s.LinearCoordinate = make(s.LinearCoordinate, **locals())
+    return coordinate
 
 
 class SchemaMethods(Collector):

@@ -32,10 +32,10 @@ def read_arrays(file: str, known: Collection[str]) -> dict[str, Real]:
     refused on the basis of the headers, before anything is unpacked.
     """
     try:
-        found = unpacked(file, dict.fromkeys(known, REAL))
+        arrays = unpacked(file, dict.fromkeys(known, REAL))
     except Unreadable as error:
         raise ValueError(f'"{file}": {error}') from None
-    return {name: values.astype(np.float64, order="C") for name, values in found.items()}
+    return {name: values.astype(np.float64, order="C") for name, values in arrays.items()}
 
 
 def unpacked(file: str | os.PathLike[str], kinds: Mapping[str, str]) -> dict[str, NDArray[Any]]:
@@ -48,13 +48,13 @@ def unpacked(file: str | os.PathLike[str], kinds: Mapping[str, str]) -> dict[str
             raise Unreadable("it holds one array", "save the arrays by name with numpy.savez")
         if not begin.startswith(ARCHIVE):  # zip readers start from the end of a file and accept any prefix
             raise Unreadable("it does not begin as an .npz archive", "write it with numpy.savez")
-        found: dict[str, NDArray[Any]] = {}
+        arrays: dict[str, NDArray[Any]] = {}
         with zipfile.ZipFile(file) as archive:
             for member in archive.infolist():
-                name = _name(member, kinds, found)
-                found[name] = _member(archive, member, name, left, kinds[name])
-                left -= max(8, found[name].itemsize) * found[name].size
-        return found
+                name = _name(member, kinds, arrays)
+                arrays[name] = _member(archive, member, name, left, kinds[name])
+                left -= max(8, arrays[name].itemsize) * arrays[name].size
+        return arrays
     except Unreadable:
         raise
     except OSError as error:

@@ -102,11 +102,11 @@ def cuts(body: BeamBody) -> tuple[float, ...]:
     """
     at, modes = {node.name: node.x_m for node in body.nodes}, body.modes
     own = [x for x, _ in _lumps_and_steps(body)] if modes.cuts or (modes.cuts is None and modes.pieces == 1) else []
-    found: list[float] = []
+    places: list[float] = []
     for x in (*(at[name] for name in modes.cuts or () if name in at), *own):
-        if 0.0 < x < body.length_m and all(abs(x - other) > AT_END * body.length_m for other in found):
-            found.append(x)
-    return tuple(sorted(found))
+        if 0.0 < x < body.length_m and all(abs(x - other) > AT_END * body.length_m for other in places):
+            places.append(x)
+    return tuple(sorted(places))
 
 
 def cut_itself(body: BeamBody) -> bool:
@@ -150,19 +150,19 @@ def _ports(held: Held, body: BeamBody) -> Places:
 
 def _held(scene: Joined) -> Held:
     """The nodes of each body with a hinge, a closure, a connector, a load, a wheel or a point mass, and these."""
-    found: Held = defaultdict(list)
-    connectors = [each for each in scene.connectors if isinstance(each, BetweenNodes)]
+    held: Held = defaultdict(list)
+    connectors = [connector for connector in scene.connectors if isinstance(connector, BetweenNodes)]
     for hinge in scene.hinges:
-        found[hinge.parent].append((hinge.parent_node, f'hinge "{hinge.name}"'))
-        found[hinge.child].append((hinge.child_node, f'hinge "{hinge.name}"'))
+        held[hinge.parent].append((hinge.parent_node, f'hinge "{hinge.name}"'))
+        held[hinge.child].append((hinge.child_node, f'hinge "{hinge.name}"'))
     for what, between in (("closure", scene.closures), ("connector", connectors)):
-        for each in between:
-            found[each.body_a].append((each.node_a, f'{what} "{each.name}"'))
-            found[each.body_b].append((each.node_b, f'{what} "{each.name}"'))
+        for item in between:
+            held[item.body_a].append((item.node_a, f'{what} "{item.name}"'))
+            held[item.body_b].append((item.node_b, f'{what} "{item.name}"'))
     for what, on_body in (("load", scene.loads), ("wheel", scene.wheels), ("point mass", scene.point_masses)):
-        for each in on_body:
-            found[each.body].append((each.node, f'{what} "{each.name}"'))
-    return found
+        for item in on_body:
+            held[item.body].append((item.node, f'{what} "{item.name}"'))
+    return held
 
 
 def _lumps_and_steps(body: BeamBody) -> Places:

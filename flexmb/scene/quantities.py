@@ -53,16 +53,16 @@ class Range:
 
     def keywords(self) -> dict[str, Any]:
         """Keywords of JSON Schema: none for a number outside that is only doubtful."""
-        found: dict[str, Any] = {}
+        words: dict[str, Any] = {}
         if self.waiver:
-            return found
+            return words
         if self.least > -LARGEST:
-            found["exclusiveMinimum" if self.excluded == self.least else "minimum"] = self.least
+            words["exclusiveMinimum" if self.excluded == self.least else "minimum"] = self.least
         elif self.excluded is not None:
-            found["not"] = {"const": self.excluded}
+            words["not"] = {"const": self.excluded}
         if self.most < LARGEST:
-            found["maximum"] = self.most
-        return found
+            words["maximum"] = self.most
+        return words
 
 
 FINITE = Range()
@@ -73,14 +73,14 @@ def within(
     remedy: str = "", waiver: str = "",
 ) -> Meta:  # fmt: skip
     """What a type says of its real numbers, see Range."""
-    found = Range(least, most, excluded, noun, remedy, waiver)
-    return Meta(extra={"range": found}, extra_json_schema=found.keywords())
+    allowed = Range(least, most, excluded, noun, remedy, waiver)
+    return Meta(extra={"range": allowed}, extra_json_schema=allowed.keywords())
 
 
 def whole(least: int, most: float = inf, *, noun: str = "", remedy: str = "") -> Meta:
     """What a type says of its whole numbers, which Python holds however large they are."""
-    found = Range(least, most, None, noun, remedy)
-    return Meta(extra={"range": found, "unit": "1"}, extra_json_schema=found.keywords())
+    allowed = Range(least, most, None, noun, remedy)
+    return Meta(extra={"range": allowed, "unit": "1"}, extra_json_schema=allowed.keywords())
 
 
 def unit(symbol: str) -> Meta:

@@ -40,10 +40,10 @@ def quaternion_of(R: Real) -> Real:
     candidates[..., 1:, 1:] = R + np.swapaxes(R, -1, -2)
     candidates[..., 1 + i, 1 + i] = 1.0 - trace[..., None] + 2.0 * R[..., i, i]
     largest = np.argmax(np.diagonal(candidates, axis1=-2, axis2=-1), axis=-1)
-    found = np.take_along_axis(candidates, largest[..., None, None], axis=-2)[..., 0, :]
-    found /= np.linalg.norm(found, axis=-1, keepdims=True)
-    first = np.take_along_axis(found, np.argmax(found != 0.0, axis=-1)[..., None], axis=-1)
-    return np.where(first < 0.0, -found, found)
+    quaternion = np.take_along_axis(candidates, largest[..., None, None], axis=-2)[..., 0, :]
+    quaternion /= np.linalg.norm(quaternion, axis=-1, keepdims=True)
+    first = np.take_along_axis(quaternion, np.argmax(quaternion != 0.0, axis=-1)[..., None], axis=-1)
+    return np.where(first < 0.0, -quaternion, quaternion)
 
 
 def rotation_by(vector: ArrayLike) -> Real:

@@ -39,12 +39,12 @@ class Unreadable(ValueError):
 def regular_size(path: str | os.PathLike[str]) -> int:
     """Size of a regular file in bytes. OSError for anything else: reading a pipe or a device might never end."""
     try:
-        found = os.stat(path)
+        status = os.stat(path)
     except ValueError:  # a NUL in the name
         raise OSError(errno.EINVAL, "this cannot be the name of a file", str(path)) from None
-    if not stat.S_ISREG(found.st_mode):
+    if not stat.S_ISREG(status.st_mode):
         raise OSError(errno.EINVAL, "this is a folder, a pipe or a device: name a regular file", str(path))
-    return found.st_size
+    return status.st_size
 
 
 def read_bytes(path: str | os.PathLike[str], limit: int = TEXT_LIMIT) -> bytes:

@@ -78,7 +78,7 @@ def _type(node: inspect.Type) -> str:
         case inspect.LiteralType(values=values):
             return ", ".join(f'`"{value}"`' for value in values)
         case inspect.UnionType(types=types):
-            return " or ".join(_type(each) for each in types if not isinstance(each, inspect.NoneType))
+            return " or ".join(_type(kind) for kind in types if not isinstance(kind, inspect.NoneType))
     return SCALARS[type(node)]
 
 

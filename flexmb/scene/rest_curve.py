@@ -49,7 +49,9 @@ def is_curved(body: BeamBody) -> bool:
 
 def is_bent(station: BeamStation, length: float) -> bool:
     """Whether a beam of this length (m) would turn by more than rounding with the curvature of a station."""
-    return any(not abs(each) * length <= ROUNDING for each in station.curvature_1_m)  # so is what is no number
+    return any(
+        not abs(component) * length <= ROUNDING for component in station.curvature_1_m
+    )  # so is what is no number
 
 
 def rest_sections(body: BeamBody, x: Real) -> tuple[Real, Real]:
@@ -65,7 +67,7 @@ def rest_sections(body: BeamBody, x: Real) -> tuple[Real, Real]:
     refuse_beyond(turn_at_rest(body), MOST_TURN, f'body "{body.name}" turns at rest by', remedy, "rad")
     spans = _spans(_stations(body))
     at = np.maximum(np.searchsorted(spans.start, x, side="right") - 1, 0)
-    start, length, quaternion, position, rates, directions = (each[at] for each in spans)
+    start, length, quaternion, position, rates, directions = (span[at] for span in spans)
     rows = length[:, None] / 2.0 * partial_integrals(2.0 * (x - start) / length - 1.0, POINTS)
     turned = quaternion + np.einsum("np,npk->nk", rows, rates)
     return position + np.einsum("np,npk->nk", rows, directions), rotation_matrix(turned)

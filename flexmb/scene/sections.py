@@ -102,7 +102,7 @@ def inertia_matrices(mass: Real, com: Real, inertia: Real) -> Real:
 def restated(station: BeamStation, point: tuple[float, float]) -> BeamStation:
     """The same section, as matrices that are stated at the point (y, z) m."""
     back = transport((-point[0], -point[1]))
-    K, M = (back.T @ each @ back for each in (stiffness_on_axis(station), inertia_on_axis(station)))
+    K, M = (back.T @ matrix @ back for matrix in (stiffness_on_axis(station), inertia_on_axis(station)))
     by_numbers = dict.fromkeys((*STIFFNESS_KEYS, *SHEAR_KEYS, INERTIA_KEYS[0])) | dict.fromkeys(INERTIA_KEYS[1:], 0.0)
     return replace(
         station, **by_numbers, stiffness=matrix(K), inertia=matrix(M), reference_point_m=point,
@@ -116,15 +116,15 @@ def matrix(values: Real) -> Matrix6:
 
 def symmetric(values: Sequence[Sequence[float]] | Real) -> Real:
     """The symmetric part (6,6)."""
-    found: Real = np.array(values, dtype=float)
-    return 0.5 * (found + found.T)
+    matrix: Real = np.array(values, dtype=float)
+    return 0.5 * (matrix + matrix.T)
 
 
 def without_shear(K: Real) -> Real:
     """Stiffness (4,4) of [extension, twist, curvatures] with no shear force: the inverse of that part of K^-1."""
     rest = K[np.ix_(WITHOUT_SHEAR, WITHOUT_SHEAR)]
-    found: Real = rest + K[np.ix_(WITHOUT_SHEAR, SHEAR)] @ free_shear(K)
-    return 0.5 * (found + found.T)
+    stiffness: Real = rest + K[np.ix_(WITHOUT_SHEAR, SHEAR)] @ free_shear(K)
+    return 0.5 * (stiffness + stiffness.T)
 
 
 def free_shear(K: Real) -> Real:

@@ -13,9 +13,7 @@ from flexmb.scene.options import SectionShape, refuse_others
 from flexmb.scene.sections import matrix
 
 
-def inertia_moments(
-    xx: float, yy: float, zz: float, xy: float = 0.0, xz: float = 0.0, yz: float = 0.0
-) -> Matrix3:
+def inertia_moments(xx: float, yy: float, zz: float, xy: float = 0.0, xz: float = 0.0, yz: float = 0.0) -> Matrix3:
     """Inertia tensor (kg m²) from its six elements; `xy` is the element -∫ x y dm, not the product of inertia."""
     return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
 
@@ -71,7 +69,7 @@ def coupled_section(
     """
     if sorted(order) != list(range(6)):
         raise ValueError(f"order: give each of 0 to 5 once, not {list(order)}")
-    found = []
+    sections = []
     for name, given in (("stiffness", stiffness), ("inertia", inertia)):
         values = np.array(given, dtype=float)
         if values.shape != (6, 6):
@@ -79,5 +77,5 @@ def coupled_section(
         slack = 1e-9 * np.sqrt(np.outer(np.diag(values), np.diag(values)).clip(0.0))
         if not np.all(np.abs(values - values.T) <= slack):
             raise ValueError(f"{name} is not symmetric: give the same value on both sides of the diagonal")
-        found.append(matrix(values[np.ix_(list(order), list(order))]))
-    return BeamStation(x_m=x, stiffness=found[0], inertia=found[1], reference_point_m=reference_point)
+        sections.append(matrix(values[np.ix_(list(order), list(order))]))
+    return BeamStation(x_m=x, stiffness=sections[0], inertia=sections[1], reference_point_m=reference_point)

@@ -145,18 +145,18 @@ def twist_inertia(body: BeamBody, stations: list[BeamStation]) -> Real:
 def in_words(body: BeamBody) -> str:
     """What a flexible beam does, what is held, and whose inertia its twist has."""
     own = polynomials(body) if body.level == "exact" else dict.fromkeys(strains(body), 0)
-    found = ", ".join(f"{count} {strain}" if count else strain for strain, count in own.items())
+    words = ", ".join(f"{count} {strain}" if count else strain for strain, count in own.items())
     possible = _of_families(body, FAMILIES)
     if held := ", ".join(strain for strain in possible if strain not in own):
-        found += f"; held: {held}"
+        words += f"; held: {held}"
     if body.level == "exact" and (pieces := piece_count(body)) > 1:
         at = ", cut at x = " + ", ".join(f"{x:g}" for x in places) + " m" if (places := cuts(body)) else ""
-        found += f"; in each of {pieces} pieces{at}"
+        words += f"; in each of {pieces} pieces{at}"
     if borrows_inertia(body):
         values = twist_inertia(body, list(body.stations))
         size = " to ".join(dict.fromkeys(f"{value:.3g}" for value in (values.min(), values.max())))
-        found += f"; its sections have no inertia about the axis, and the twist has {size} kg m"
-    return found
+        words += f"; its sections have no inertia about the axis, and the twist has {size} kg m"
+    return words
 
 
 def _polar(station: BeamStation) -> float:

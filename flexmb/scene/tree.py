@@ -118,7 +118,7 @@ def _on_beam(body: BeamBody, x: float, quaternion: Quaternion) -> NodeFrame:
     """Rest frame of a node at x of a beam."""
     if not is_curved(body):
         return NodeFrame((x, 0.0, 0.0), quaternion)
-    position, rotation = (each[0] for each in rest_sections(body, np.array([x])))
+    position, rotation = (section[0] for section in rest_sections(body, np.array([x])))
     at, turn = position.tolist(), quaternion_of(rotation @ rotation_matrix(quaternion)).tolist()
     return NodeFrame((at[0], at[1], at[2]), (turn[0], turn[1], turn[2], turn[3]))
 
@@ -146,23 +146,23 @@ def coordinates(item: Hinge | PointMass) -> tuple[NamedCoordinate, ...]:
     """
     if isinstance(item, PointMass) and not item.coordinates:
         return tuple(NamedCoordinate(f"coordinates[{i}]", LinearCoordinate()) for i in range(len(item.directions)))
-    found: list[NamedCoordinate] = []
+    coordinates: list[NamedCoordinate] = []
     for key in struct_keys(type(item)):  # a hinge holds no other structs
         match getattr(item, key):
             case AngularCoordinate() | LinearCoordinate() as coordinate:
-                found.append(NamedCoordinate(key, coordinate))
+                coordinates.append(NamedCoordinate(key, coordinate))
             case (AngularCoordinate() | LinearCoordinate(), *_) as several:
-                found.extend(NamedCoordinate(f"{key}[{i}]", each) for i, each in enumerate(several))
-    return tuple(found)
+                coordinates.extend(NamedCoordinate(f"{key}[{i}]", each) for i, each in enumerate(several))
+    return tuple(coordinates)
 
 
 def with_coordinates(item: Item, changed: Iterable[Coordinate]) -> Item:
     """A hinge or point mass with other scalar coordinates, in the order of `coordinates`."""
-    found: dict[str, Any] = {}
+    changes: dict[str, Any] = {}
     for (name, _), coordinate in zip(coordinates(item), changed, strict=True):
         key, bracket, _ = name.partition("[")
-        found[key] = (*found.get(key, ()), coordinate) if bracket else coordinate
-    return replace(item, **found)
+        changes[key] = (*changes.get(key, ()), coordinate) if bracket else coordinate
+    return replace(item, **changes)
 
 
 def scalar_paths(scene: Scene) -> dict[str, str]:
@@ -170,13 +170,13 @@ def scalar_paths(scene: Scene) -> dict[str, str]:
 
     Paths are those of `Scene.with_values`.
     """
-    found = {}
+    paths = {}
     for collection in ("hinges", "point_masses"):
         for item in getattr(scene, collection):
             for name, _ in coordinates(item):
                 key = name.replace("[", ".").rstrip("]")
-                found[f"{item.name}.{name}"] = f"{collection}.{item.name}.{key}"
-    return found | {f"{wheel.name}.angle": f"wheels.{wheel.name}" for wheel in scene.wheels}
+                paths[f"{item.name}.{name}"] = f"{collection}.{item.name}.{key}"
+    return paths | {f"{wheel.name}.angle": f"wheels.{wheel.name}" for wheel in scene.wheels}
 
 
 def rate_name(coordinate: str, path: str) -> str:
@@ -234,13 +234,13 @@ def _coupled(hinges: dict[str, Hinge], item: Coupling | CoupledCoordinate, facto
     if hinge is None:
         raise ValueError(f'there is no hinge "{item.hinge}"')
     scalar = coordinates(hinge)
-    found = [(n, each) for n, each in enumerate(scalar) if item.coordinate in ("", each.name)]
-    if len(found) == 1:
-        return Coupled(hinge, *found[0], factor)
-    names = ", ".join(each.name for each in scalar)
+    candidates = [(n, each) for n, each in enumerate(scalar) if item.coordinate in ("", each.name)]
+    if len(candidates) == 1:
+        return Coupled(hinge, *candidates[0], factor)
+    names = ", ".join(coordinate.name for coordinate in scalar)
     if not scalar:
         raise ValueError(f'hinge "{item.hinge}" of type {hinge.__struct_config__.tag} has no scalar coordinate')
-    if found:
+    if candidates:
         raise ValueError(f'hinge "{item.hinge}" has more than one coordinate, {names}: say which is meant')
     raise ValueError(f'hinge "{item.hinge}" has no coordinate "{item.coordinate}"; it has {names}')
 

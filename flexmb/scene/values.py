@@ -61,11 +61,11 @@ def _in_full(scene: Any, path: str) -> list[str]:
         return steps
     arrays = {key: [getattr(item, "name", "") for item in getattr(scene, key)] for key in scene.__struct_fields__
               if isinstance(getattr(scene, key), tuple)}  # fmt: skip
-    found = [key for key, names in arrays.items() if steps[0] in names]
-    if len(found) == 1:
-        return [found[0], *steps]
-    if found:
-        raise PathError(f'parameter "{path}": {" and ".join(found)} have a "{steps[0]}": begin with one of them')
+    keys = [key for key, names in arrays.items() if steps[0] in names]
+    if len(keys) == 1:
+        return [keys[0], *steps]
+    if keys:
+        raise PathError(f'parameter "{path}": {" and ".join(keys)} have a "{steps[0]}": begin with one of them')
     known = [*scene.__struct_fields__, *(name for names in arrays.values() for name in names)]
     raise _no_way(path, steps[0], filter(None, known))
 

@@ -59,7 +59,7 @@ class Blocks:
         n = system.nq + system.nu + 1
         self.state, self.slope = (wide_zeros((len(tables), n), width=DualType.width) for _ in range(2))
         self.workspaces = [
-            _workspace(system, each.constants, self.state[b], self.slope[b]) for b, each in enumerate(tables)
+            _workspace(system, dual.constants, self.state[b], self.slope[b]) for b, dual in enumerate(tables)
         ]
         out, closures = system.observation.out, 0 if system.closures is None else len(system.scene.constraints)
         free = len(out.every) + len(out.drives)
@@ -69,7 +69,7 @@ class Blocks:
         self._loads = list[chain.ClosureLoads]()
         if system.closures is None:
             pairs = zip(tables, self.workspaces, strict=True)
-            self.tables: list[Any] = [tree.TreeBlock(c=each.constants, w=w) for each, w in pairs]
+            self.tables: list[Any] = [tree.TreeBlock(c=constants.constants, w=w) for constants, w in pairs]
         else:
             self._loads = [chain.ClosureLoads(each[free:].reshape(closures, 6, -1)) for each in self.every]
             self.tables = self._chains(system)
@@ -83,20 +83,20 @@ class Blocks:
     def _chains(self, system: System) -> list[Any]:
         assert system.closures is not None
         self.chain = system.closures.chain("articulated")
-        found = []
-        for each, w in zip(self.duals, self.workspaces, strict=True):
-            assert each.closures is not None
-            found.append(
+        chains = []
+        for dual, w in zip(self.duals, self.workspaces, strict=True):
+            assert dual.closures is not None
+            chains.append(
                 chain.ChainBlock(
                     chain=self.chain,
-                    c=each.constants,
-                    cc=each.closures,
+                    c=dual.constants,
+                    cc=dual.closures,
                     y=np.zeros(len(self.state[0])),
                     slope=np.zeros(len(self.state[0])),
                     x=chain_rates(w, system.closures.constants[1]),
                 )  # fmt: skip
             )
-        return found
+        return chains
 
     def choose_rows(self, t: float, y: Real) -> None:
         """Have a chain choose its independent rows at y = [q, u, work]."""
@@ -109,7 +109,7 @@ class Blocks:
     @property
     def where(self) -> list[int]:
         """Addresses of the tables of all blocks."""
-        return [address(each) for each in self.tables]
+        return [address(table) for table in self.tables]
 
     @property
     def where_loads(self) -> list[int]:
@@ -133,18 +133,18 @@ class Blocks:
 
     def inertia_forces(self, t: float, rates: Real) -> tuple[Real, Real]:
         """M rates (nu,) for given rates (nu,) at the coordinates of the blocks' states, and its derivatives (nu,P)."""
-        found = []
-        for each, w in zip(self.duals, self.workspaces, strict=True):
+        forces = []
+        for dual, w in zip(self.duals, self.workspaces, strict=True):
             x = tree.Inertial(as_duals(np.zeros(len(rates))))
-            tree.inertia_forces(t, each.constants, w, rates, x)
+            tree.inertia_forces(t, dual.constants, w, rates, x)
             moved = x.tau.copy()
-            tree.inertia_forces(t, each.constants, w, np.zeros(len(rates)), x)
-            found.append(moved - x.tau)
-        return found[0][:, 0], self.joined(found)
+            tree.inertia_forces(t, dual.constants, w, np.zeros(len(rates)), x)
+            forces.append(moved - x.tau)
+        return forces[0][:, 0], self.joined(forces)
 
     def response(self, t: float, load: Real) -> RowResponse:
         """How the motion of a closed chain at the blocks' states responds to loads of rows (G,)."""
-        found = []
+        responses = []
         for block, w in zip(self.tables, self.workspaces, strict=True):
             parts = []
             for given in (load, np.zeros(len(load))):
@@ -152,13 +152,13 @@ class Blocks:
                 rates = w.slope[self.system.nq : self.system.nq + self.system.nu]
                 parts.append((rates.copy(), w.speed["drive"].copy(), block.x.cw.row["rate"].copy()))
             (gained, drive, _), (own, idle, rate) = parts
-            found.append((gained - own, drive - idle, rate))
-        gains, drives, of_rows = (self.joined([each[i] for each in found]) for i in range(3))
-        return RowResponse(found[0][0][:, 0], gains, drives, of_rows)
+            responses.append((gained - own, drive - idle, rate))
+        gains, drives, of_rows = (self.joined([parts[i] for parts in responses]) for i in range(3))
+        return RowResponse(responses[0][0][:, 0], gains, drives, of_rows)
 
     def joined(self, duals: Sequence[Real]) -> Real:
         """The derivatives (...,P) of one array of duals (...,9) for each block."""
-        return np.concatenate([each[..., 1:] for each in duals], axis=-1)[..., : self.directions]
+        return np.concatenate([dual[..., 1:] for dual in duals], axis=-1)[..., : self.directions]
 
 
 def dual_parts(table: Any) -> Iterator[tuple[str, str | None, Any]]:

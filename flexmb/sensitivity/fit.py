@@ -196,10 +196,10 @@ def fit(
     """
     max_runs = arguments.count("max_runs", max_runs)
     found, given = numbers(scene, parameters), measurements(data)
-    names = tuple(each.name for each in found)
+    names = tuple(number.name for number in found)
     refuse_unknown("fit", settings)
-    problem = _Problem(scene, names, np.array([each.scale for each in found]), given, settings)
-    start = np.array([each.value for each in found]) / problem.scales
+    problem = _Problem(scene, names, np.array([number.scale for number in found]), given, settings)
+    start = np.array([number.value for number in found]) / problem.scales
     limits = _limits(bounds or {}, names, start, problem.scales)
     if int(np.sum(problem.known)) < len(names):
         raise ValueError(
@@ -228,8 +228,8 @@ def _searched(problem: _Problem, start: Real, limits: tuple[Real, Real], noise: 
             run = None
         if run is None or not run.trajectory.finished or len(run.trajectory.t) < len(problem.times):
             return np.full(int(np.sum(known)), np.nan)  # the search takes a shorter step
-        found: Real = ((problem.seen(run) - data.values) / weights)[known]
-        return found
+        residuals: Real = ((problem.seen(run) - data.values) / weights)[known]
+        return residuals
 
     def jacobian(x: Real) -> Real:
         scaled = problem.derivatives(x) / weights[:, None]
@@ -296,9 +296,9 @@ def _covariance(J: Real, x: Real) -> tuple[Real, Any]:
 
 
 def _by_time(known: Any, row: Real) -> Real:
-    found = np.full(known.shape, np.nan)
-    found[known] = row
-    return found
+    slopes = np.full(known.shape, np.nan)
+    slopes[known] = row
+    return slopes
 
 
 def _rms(values: Real) -> float:
@@ -338,10 +338,10 @@ def _given_noise(sigma: float | Mapping[str, float] | None, channels: Sequence[s
     missing = [name for name in channels if name not in sigma]
     if missing:
         raise ValueError(f'sigma: none is given for "{missing[0]}": give one for each channel')
-    found = np.array([arguments.number(f'sigma["{name}"]', sigma[name]) for name in channels])
-    if not np.all(found > 0.0):
+    sizes = np.array([arguments.number(f'sigma["{name}"]', sigma[name]) for name in channels])
+    if not np.all(sizes > 0.0):
         raise ValueError("sigma: every standard deviation must be positive")
-    return found
+    return sizes
 
 
 def _refuse_unknown_channels(trajectory: Trajectory, channels: Sequence[str]) -> None:

@@ -29,7 +29,7 @@ class Following:
     """One run, followed with scaled derivatives: each is per SHARE of the `scale` of its number."""
 
     def __init__(self, admitted: Admitted, settings: Settings, trajectory: Trajectory, outputs: Chosen) -> None:
-        self._scales = np.array([SHARE * each.scale for each in admitted.numbers])
+        self._scales = np.array([SHARE * number.scale for number in admitted.numbers])
         self._settings, self._trajectory, self._outputs = settings, trajectory, outputs
         length = float(trajectory.t[-1] - trajectory.t[0])
         self._passage = Passage(admitted, admitted.numbers, self._scales, settings, length)
@@ -55,8 +55,8 @@ class Following:
                     states = variation.integrate(at, clock.times, clock, self._settings)
                 before = Course(leg.raw.y, variation.parted(states[-1]).Y)
                 self._see(variation, solve, clock.times, states, times, is_last)
-                found = self._passage.ended(variation, before)
-                self._events += [(each.event.name, stop, each.dt) for each in found.crossings]
+                variation_after = self._passage.ended(variation, before)
+                self._events += [(crossing.event.name, stop, crossing.dt) for crossing in variation_after.crossings]
         self._derivatives[np.isnan(self._outputs.values)] = np.nan  # of loads that closures leave undetermined
         return self._derivatives / self._scales, [(name, t, dt / self._scales) for name, t, dt in self._events]
 

@@ -51,31 +51,31 @@ def prepared(scene: Scene) -> System:
 def admitted_to(system: System, names: Sequence[str]) -> Admitted:
     """The same of a prepared system."""
     scene = system.scene
-    found = numbers(scene, names)
-    refuse_moving_instants(scene, found)
-    acting = [each for each in found if differ_in_mechanics(scene, each.nearby)]
+    numbers_of = numbers(scene, names)
+    refuse_moving_instants(scene, numbers_of)
+    acting = [number for number in numbers_of if differ_in_mechanics(scene, number.nearby)]
     tables = Parameters(system, acting)
-    reached = {each.name for each, is_reached in zip(acting, tables.reached.tolist(), strict=True) if is_reached}
-    for each in found:
+    reached = {number.name for number, is_reached in zip(acting, tables.reached.tolist(), strict=True) if is_reached}
+    for number in numbers_of:
         if not (
-            each.name in reached
-            or reaches_event(scene, each)
-            or reaches_laws(system, each)
-            or _reaches_change(scene, each)
+            number.name in reached
+            or reaches_event(scene, number)
+            or reaches_laws(system, number)
+            or _reaches_change(scene, number)
         ):
             raise ParameterError(
-                f'parameter "{each.name}" = {each.value:g}: nothing in the run depends on it, neither the equations of '
-                "motion or the initial state nor a controller or an event (initial values of prescribed coordinates, "
-                "for example, come from their functions): leave it out"
+                f'parameter "{number.name}" = {number.value:g}: nothing in the run depends on it, neither the '
+                "equations of motion or the initial state nor a controller or an event (initial values of prescribed "
+                "coordinates, for example, come from their functions): leave it out"
             )
-    return Admitted(system, found, tables, HandedOver())
+    return Admitted(system, numbers_of, tables, HandedOver())
 
 
 def again(before: Admitted, system: System) -> Admitted:
     """The same numbers of a prepared system that differs in their values only: what admits them does not depend on
     these, and steady derivatives are kept. Blocks are taken over, so that `before` must not be followed any more."""
-    found = numbers(system.scene, [each.name for each in before.numbers])
-    acting = [each for each in found if each.name in before.tables.names]
+    found = numbers(system.scene, [number.name for number in before.numbers])
+    acting = [number for number in found if number.name in before.tables.names]
     handed = HandedOver(None if system.scene.controllers else before.handed.left)  # controllers write into the tables
     return Admitted(system, found, Parameters(system, acting, like=before.tables), handed)
 

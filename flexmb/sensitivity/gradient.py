@@ -94,13 +94,11 @@ def gradient(
         list(term.probes(t_end, []))  # refuses what does not fit the run
     trajectory, course = run_with_course(gated.system, np.array([0.0, t_end]), given)
     if not trajectory.finished or trajectory.t[-1] < t_end:
-        raise DynamicsError(
-            f"there is no gradient of a run that does not reach t = {t_end:g} s: {trajectory.message}"
-        )
+        raise DynamicsError(f"there is no gradient of a run that does not reach t = {t_end:g} s: {trajectory.message}")
     refuse_undetermined(trajectory, [name for term in terms for name in term.channels])
     adjoint, found = Adjoint(gated, terms, given), gated.numbers
     derivatives = adjoint(course)
     return Gradient(
-        adjoint.value, tuple(each.name for each in found), np.array([each.value for each in found]), derivatives,
-        adjoint.cost.steps, adjoint.cost.checkpoints, trajectory,
+        adjoint.value, tuple(number.name for number in found), np.array([number.value for number in found]),
+        derivatives, adjoint.cost.steps, adjoint.cost.checkpoints, trajectory,
     )  # fmt: skip

@@ -86,9 +86,9 @@ class Striking:
             along = np.vstack([along, J])
             impulses, rows = np.split(np.linalg.lstsq(along.T, M @ gain, rcond=DEPENDENT)[0], [k])
             self._put(state.u + gain, D, with_speeds=False)
-            found = blocks.response(t, rows)
-            by_closures, of_drives, opening = found.gain, -found.drive_rates, -found.row_rates
-            by_rows = M @ found.gain_rates
+            response = blocks.response(t, rows)
+            by_closures, of_drives, opening = response.gain, -response.drive_rates, -response.row_rates
+            by_rows = M @ response.gain_rates
         self._put(state.u, D)
         _, turned = blocks.inertia_forces(t, gain - by_closures)  # dM M^-1 E'p, by the change of the coordinates
         right = M @ D[nq : nq + nu] - turned + by_rows

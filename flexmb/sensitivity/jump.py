@@ -64,16 +64,16 @@ def jumped(
     leg, t = variation.leg, variation.leg.raw.t
     _refuse(leg)
     P = end.Y.shape[1]
-    is_fixed = all(not _moves(each) and not np.any(_level(each, rates, P)) for each in leg.events)
+    is_fixed = all(not _moves(event) and not np.any(_level(event, rates, P)) for event in leg.events)
     before = None if is_fixed else variation.slope(np.nextafter(t, -np.inf), end)
-    crossings = [Crossing(each, _time(variation, end, before, each, rates, tolerance)) for each in leg.events]
+    crossings = [Crossing(event, _time(variation, end, before, event, rates, tolerance)) for event in leg.events]
     dt = crossings[0].dt if crossings else np.zeros(P)
-    for each in crossings[1:]:
-        if np.max(np.abs(each.dt - dt)) > SAME * np.max(np.abs(np.concatenate([dt, each.dt]))):
+    for crossing in crossings[1:]:
+        if np.max(np.abs(crossing.dt - dt)) > SAME * np.max(np.abs(np.concatenate([dt, crossing.dt]))):
             raise EventError(
-                f'events "{crossings[0].event.name}" and "{each.event.name}" happen at one instant, t = {t:g} s, but '
-                "their times change differently with the parameters: which comes first changes what follows, so that "
-                "the run has no derivative beyond; move one of them"
+                f'events "{crossings[0].event.name}" and "{crossing.event.name}" happen at one instant, t = {t:g} s, '
+                "but their times change differently with the parameters: which comes first changes what follows, so "
+                "that the run has no derivative beyond; move one of them"
             )
     D = end.Y if before is None else end.Y + np.outer(before.y, dt)
     held, changes = dict(held), list[ChangeOfValue]()
@@ -87,9 +87,7 @@ def jumped(
     return Jumped(crossings, dt, D, held, changes)
 
 
-def _acted(
-    striking: Striking, action: Action, D: Real, restitution: Real | None, held: dict[str, Real]
-) -> Real:
+def _acted(striking: Striking, action: Action, D: Real, restitution: Real | None, held: dict[str, Real]) -> Real:
     """The change of the state after an action along D (n,P)."""
     match action:
         case Latch(coordinate=name):

@@ -41,15 +41,15 @@ class EventRates(NamedTuple):
 def law_rates(system: System, numbers: Sequence[Number | None], scales: Real) -> LawRates:
     """Of a system's controllers by these numbers; None for one on which nothing depends."""
     wiring = wired(system)
-    found = np.zeros((len(_of_laws(system, system.scene, are_driven=False)), len(numbers)))
+    rates = np.zeros((len(_of_laws(system, system.scene, are_driven=False)), len(numbers)))
     concerned = _concerned(numbers, system.scene)
     for are_driven in (False, True):
-        chosen = [each if own is are_driven else None for each, own in zip(numbers, concerned, strict=True)]
+        chosen = [number if own is are_driven else None for number, own in zip(numbers, concerned, strict=True)]
         if any(chosen):
-            found += _by_numbers(partial(_of_laws, system, are_driven=are_driven), system.scene, chosen, scales)
+            rates += _by_numbers(partial(_of_laws, system, are_driven=are_driven), system.scene, chosen, scales)
     shapes = wiring.number.shape, wiring.initial.shape, wiring.drive.shape, (len(wiring.course), 4), wiring.piece.shape
     stops = np.cumsum([np.prod(shape, dtype=int) for shape in shapes])
-    parts = np.split(found, stops[:-1])
+    parts = np.split(rates, stops[:-1])
     return LawRates(*(part.reshape(*shape, len(numbers)) for part, shape in zip(parts, shapes, strict=True)))
 
 
@@ -73,7 +73,7 @@ def _of_laws(system: System, scene: Scene, are_driven: bool) -> Real:
 def event_rates(scene: Scene, numbers: Sequence[Number | None], scales: Real) -> dict[str, EventRates]:
     """Of all events of a scene, by name."""
     found = dict[str, EventRates]()
-    numbers = [each if each is not None and each.nearby.events != scene.events else None for each in numbers]
+    numbers = [number if number is not None and number.nearby.events != scene.events else None for number in numbers]
     for event in scene.events:
         impacts = [i for i, action in enumerate(event.actions) if isinstance(action, Impact)]
         rates = _by_numbers(partial(_of_event, name=event.name), scene, numbers, scales)
@@ -84,12 +84,12 @@ def event_rates(scene: Scene, numbers: Sequence[Number | None], scales: Real) ->
 def reaches_event(scene: Scene, number: Number) -> bool:
     """Whether the level of an event or a restitution differs with a number."""
     other = number.nearby
-    return any(not np.array_equal(_of_event(scene, each.name), _of_event(other, each.name)) for each in scene.events)
+    return any(not np.array_equal(_of_event(scene, event.name), _of_event(other, event.name)) for event in scene.events)
 
 
 def _of_event(scene: Scene, name: str) -> Real:
-    [event] = [each for each in scene.events if each.name == name]
-    return np.array([event.level, *(each.restitution for each in event.actions if isinstance(each, Impact))])
+    [event] = [event for event in scene.events if event.name == name]
+    return np.array([event.level, *(action.restitution for action in event.actions if isinstance(action, Impact))])
 
 
 def _concerned(numbers: Sequence[Number | None], scene: Scene) -> list[bool | None]:
@@ -103,7 +103,7 @@ def _concerned(numbers: Sequence[Number | None], scene: Scene) -> list[bool | No
 
 
 def _driven_gains(scene: Scene) -> list[float]:
-    return [each.gain for _, _, each in values(ROOT, scene) if isinstance(each, ControlSignal)]
+    return [function.gain for _, _, function in values(ROOT, scene) if isinstance(function, ControlSignal)]
 
 
 def _by_numbers(

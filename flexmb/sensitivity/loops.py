@@ -56,20 +56,20 @@ class Loops:
             _variation(made, feedback, plain, blocks, b, state=self.law[b], change=self.law_rate[b])
             for b in range(len(blocks))
         ]
-        for b, each in enumerate(self.tables):
-            set_lanes(each.number, rates.number, b)
-            set_lanes(each.drive["gain"], rates.gain, b)
-            set_lanes(each.course["data"], rates.course, b)
-            set_lanes(each.piece, rates.piece, b)
+        for b, tables in enumerate(self.tables):
+            set_lanes(tables.number, rates.number, b)
+            set_lanes(tables.drive["gain"], rates.gain, b)
+            set_lanes(tables.course["data"], rates.course, b)
+            set_lanes(tables.piece, rates.piece, b)
             if before is None:
-                set_lanes(each.state, rates.state, b)
+                set_lanes(tables.state, rates.state, b)
             else:
                 for name in KEPT:
-                    old, new = getattr(before.tables[b], name), getattr(each, name)
+                    old, new = getattr(before.tables[b], name), getattr(tables, name)
                     rows = min(len(old), len(new))
                     new[:rows, ..., 0 if ends else 1 :] = old[:rows, ..., 0 if ends else 1 :]
                 if ends:
-                    each.following[:] = before.tables[b].following
+                    tables.following[:] = before.tables[b].following
         first = self.tables[0]
         self.steer, _ = addresses(variation.steer, STATUS, REAL, first)
         self.follow = addresses(variation.follow, STATUS, REAL, first)[0] if made.follows[0] else 0
@@ -77,15 +77,15 @@ class Loops:
     @property
     def where(self) -> list[int]:
         """Addresses of the tables of all loops."""
-        return [address(each) for each in self.tables]
+        return [address(table) for table in self.tables]
 
     def begin(self, t: float) -> None:
         """Begin the continuous controllers at the states of the blocks; sampled ones that are due at t act first."""
-        for each in self.tables:
-            variation.begin(t, each)
-            if each.continuous[0] and len(each.instant) and each.instant["time"][each.following[0], 0] == t:
-                variation.steer(t, each)
-                variation.begin(t, each)
+        for table in self.tables:
+            variation.begin(t, table)
+            if table.continuous[0] and len(table.instant) and table.instant["time"][table.following[0], 0] == t:
+                variation.steer(t, table)
+                variation.begin(t, table)
 
     def is_due(self, t: float) -> bool:
         """Whether a sampled controller acts at t."""
@@ -112,24 +112,24 @@ class Loops:
 
     def replay(self) -> None:
         """From now on outputs of sampled controllers are read back."""
-        for each in self.tables:
-            each.replaying[0] = 1
-            each.now[0] = np.inf
+        for table in self.tables:
+            table.replaying[0] = 1
+            table.now[0] = np.inf
 
     def look(self, t: float) -> tuple[Real, Real]:
         """All signals (S,) and their derivatives (S,P) at t, at the states of the blocks."""
-        for each in self.tables:
-            self.blocks.check(variation.look(t, each))
+        for table in self.tables:
+            self.blocks.check(variation.look(t, table))
         self._feedback.raise_trouble()
-        return self.tables[0].signal[:, 0].copy(), self.blocks.joined([each.signal for each in self.tables])
+        return self.tables[0].signal[:, 0].copy(), self.blocks.joined([table.signal for table in self.tables])
 
 
 def _variation(made: Loop, feedback: Feedback, plain: PlainLaw, blocks: Blocks, b: int, **own: Any) -> LoopVariation:
     w, out, c = blocks.workspaces[b], blocks.outputs[b], blocks.duals[b].constants
     arrays: dict[str, Any] = {
-        each.name: as_duals(getattr(made, each.name))
-        for each in fields(LoopVariation)
-        if each.name not in ("plain", "address", "drive", "instant", "held", *_SHARED, *own)
+        field.name: as_duals(getattr(made, field.name))
+        for field in fields(LoopVariation)
+        if field.name not in ("plain", "address", "drive", "instant", "held", *_SHARED, *own)
     }
     where = np.zeros(ADDRESSES, np.int64)
     where[MOTION], where[WORKSPACE], where[OUTPUTS] = blocks.motion, blocks.where[b], address(out)

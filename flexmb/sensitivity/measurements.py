@@ -31,7 +31,9 @@ class Measurements(NamedTuple):
 def measurements(data: str | os.PathLike[str] | Mapping[str, Any]) -> Measurements:
     """The measurements in a file, or in arrays by name with the times as "t"; ValueError or TypeError for others."""
     if isinstance(data, Mapping):
-        return _checked("data", {str(name): arguments.array(f'data["{name}"]', each) for name, each in data.items()})
+        return _checked(
+            "data", {str(name): arguments.array(f'data["{name}"]', column) for name, column in data.items()}
+        )
     return _checked(str(data), _read(Path(data)))
 
 
@@ -76,11 +78,11 @@ def _checked(where: str, columns: dict[str, Real]) -> Measurements:
         or t[-1] <= 0.0
     ):
         raise ValueError(f"{where}: the times must be finite and increase, from 0 s on, where the run starts")
-    for name, each in columns.items():
-        if each.shape != t.shape:
-            raise ValueError(f'{where}: "{name}" has the shape {each.shape}, but there are {len(t)} times')
-        if np.isinf(each).any():
+    for name, column in columns.items():
+        if column.shape != t.shape:
+            raise ValueError(f'{where}: "{name}" has the shape {column.shape}, but there are {len(t)} times')
+        if np.isinf(column).any():
             raise ValueError(f'{where}: "{name}" has infinite values: leave out what was not measured')
-        if np.isnan(each).all():
+        if np.isnan(column).all():
             raise ValueError(f'{where}: "{name}" has no values')
     return Measurements(t.astype(float), tuple(columns), np.column_stack(list(columns.values())))

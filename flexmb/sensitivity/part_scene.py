@@ -38,8 +38,8 @@ class PartScene:
 
     def scene_with(self, values: Mapping[str, float]) -> Scene:
         """The scene of the part with other values, by name of the number."""
-        found: Scene = _carried(self._base, self.now, changed(self._given.with_values(values), self._changes))
-        return found
+        scene: Scene = _carried(self._base, self.now, changed(self._given.with_values(values), self._changes))
+        return scene
 
     def is_mechanical(self, number: Number) -> bool:
         """Whether the mechanics of the part may depend on a number. Of a coordinate that is held they may not, though
@@ -69,7 +69,7 @@ def all_changes(scene: Scene) -> Iterator[ChangeOfValue]:
 
 def changed(scene: Scene, changes: Sequence[ChangeOfValue]) -> Scene:
     """The scene after changes, with the values that its own events have."""
-    events = {each.name: each for each in scene.events}
+    events = {event.name: event for event in scene.events}
     for name, i in changes:
         action = events[name].actions[i]
         assert isinstance(action, Change)  # what a `ChangeOfValue` names
@@ -90,9 +90,12 @@ def _carried(base: Any, now: Any, other: Any) -> Any:
     if other is base or other == base:
         return now
     if isinstance(base, msgspec.Struct) and type(base) is type(now) is type(other):
-        parts = {key: _carried(*(getattr(each, key) for each in (base, now, other))) for key in base.__struct_fields__}
+        parts = {
+            key: _carried(*(getattr(scene_of_part, key) for scene_of_part in (base, now, other)))
+            for key in base.__struct_fields__
+        }
         return msgspec.structs.replace(now, **parts)
     if isinstance(base, tuple) and len(base) == len(other) <= len(now):  # events may have added some at its end
-        kept = (_carried(*each) for each in zip(base, now[: len(base)], other, strict=True))
+        kept = (_carried(*items) for items in zip(base, now[: len(base)], other, strict=True))
         return (*kept, *now[len(base) :])
     return now

@@ -54,14 +54,14 @@ class Passage:
             assert self._blocks is not None
             return self._blocks
         part = PartScene(self._scene, self._changes, leg.system.scene)
-        self._of_part = [None if each is None else PartNumber(each, part) for each in self._numbers]
+        self._of_part = [None if number is None else PartNumber(number, part) for number in self._numbers]
         self._laws = None
         if self.after is None:
-            names = [None if each is None else each.name for each in self._numbers]
+            names = [None if number is None else number.name for number in self._numbers]
             chosen = [names.index(name) for name in self._admitted.tables.names]
             self._blocks, self._start = self._systems.first(self._admitted.tables, chosen)
         else:
-            acting = [each if each is not None and part.is_mechanical(each) else None for each in self._of_part]
+            acting = [event if event is not None and part.is_mechanical(event) else None for event in self._of_part]
             anew = bool(self.after.changes)
             self._blocks = self._systems.then(leg.system, leg.begin.state, acting, self.after.held, anew)
         self._system = leg.system
@@ -107,9 +107,9 @@ class Passage:
         """What the events at the end of a part of the run do to the derivatives there; kept as `after`."""
         leg, settings = variation.leg, self._settings
         tolerance = np.array([settings.atol, settings.rtol, self._length])
-        found = jumped(variation, end, self._levels, {} if self.after is None else self.after.held, tolerance)
-        if found.changes:
-            self._changes += found.changes
-            self._energy = variation.energy_rates(leg.raw.t, Course(end.y, found.D), found.dt)
-        self.after = found
-        return found
+        variation_after = jumped(variation, end, self._levels, {} if self.after is None else self.after.held, tolerance)
+        if variation_after.changes:
+            self._changes += variation_after.changes
+            self._energy = variation.energy_rates(leg.raw.t, Course(end.y, variation_after.D), variation_after.dt)
+        self.after = variation_after
+        return variation_after

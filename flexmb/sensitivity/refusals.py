@@ -23,12 +23,12 @@ _CLOSED = 1e-9  # m and rad, to which starts are closed with room for rounding
 
 def refuse_moving_instants(scene: Scene, numbers: Sequence[Number]) -> None:
     """ParameterError for numbers that move the instants of sampled controllers or the ends of pulses."""
-    changes = [(), *((each,) for each in all_changes(scene))]
-    own = [(_schedule(now), _pulses(now)) for now in (changed(scene, each) for each in changes)]
+    changes = [(), *((change,) for change in all_changes(scene))]
+    own = [(_schedule(now), _pulses(now)) for now in (changed(scene, change) for change in changes)]
     if not any(schedule or pulses for schedule, pulses in own):
         return
     for number in numbers:
-        others = [changed(number.nearby, each) for each in changes]
+        others = [changed(number.nearby, change) for change in changes]
         if any(_schedule(other) != schedule for other, (schedule, _) in zip(others, own, strict=True)):
             raise ParameterError(
                 f'parameter "{number.name}" moves the instants at which a sampled controller acts: derivatives by it '
@@ -73,17 +73,19 @@ def refuse_opened_closures(system: System) -> None:
 
 
 def _schedule(scene: Scene) -> list[tuple[float | None, ...]]:
-    return [tuple(getattr(each, name) for name in _SCHEDULE) for each in scene.controllers]
+    return [tuple(getattr(controller, name) for name in _SCHEDULE) for controller in scene.controllers]
 
 
 def _pulses(scene: Scene) -> list[tuple[float, float]]:
-    return [(each.start_s, each.duration_s) for _, _, each in values(ROOT, scene) if isinstance(each, Pulse)]
+    return [
+        (function.start_s, function.duration_s) for _, _, function in values(ROOT, scene) if isinstance(function, Pulse)
+    ]
 
 
 def refuse_beyond_adjoint(scene: Scene) -> None:
     """NotImplementedError for scenes whose runs are not passed backwards."""
     for has, what in (
-        (any(each.period_s is None for each in scene.controllers), "continuous controllers"),
+        (any(controller.period_s is None for controller in scene.controllers), "continuous controllers"),
         (watches_signals(scene), "events that watch signals"),
     ):
         if has:

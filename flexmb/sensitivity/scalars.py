@@ -98,15 +98,15 @@ class Misfit:
     def _sigmas(self) -> list[float]:
         names = self.measured.channels
         if not isinstance(self.sigma, Mapping):
-            found = [arguments.number("sigma", self.sigma)] * len(names)
+            sizes = [arguments.number("sigma", self.sigma)] * len(names)
         else:
             missing = [name for name in names if name not in self.sigma]
             if missing or len(self.sigma) > len(names):
                 raise ValueError(f"sigma has {', '.join(self.sigma)}, but the channels are {', '.join(names)}")
-            found = [arguments.number(f'sigma["{name}"]', self.sigma[name]) for name in names]
-        if not min(found) > 0.0:
+            sizes = [arguments.number(f'sigma["{name}"]', self.sigma[name]) for name in names]
+        if not min(sizes) > 0.0:
             raise ValueError("sigma is a standard deviation: give positive numbers")
-        return found
+        return sizes
 
 
 @dataclass(frozen=True)
@@ -164,13 +164,12 @@ def _named(channel: Any) -> str:
 
 def terms_of(of: ScalarTerm | Sequence[ScalarTerm]) -> tuple[ScalarTerm, ...]:
     """The terms of a scalar; TypeError or ValueError for anything else."""
-    found = (of,) if isinstance(of, ScalarTerm) else tuple(of) if isinstance(of, Sequence) else (of,)
-    for each in found:
-        if not isinstance(each, ScalarTerm):
+    terms = (of,) if isinstance(of, ScalarTerm) else tuple(of) if isinstance(of, Sequence) else (of,)
+    for term in terms:
+        if not isinstance(term, ScalarTerm):
             raise TypeError(
-                f"of is {each!r}: give a FinalValue, a Misfit or a TimeIntegral, or a list of them, which are added"
+                f"of is {term!r}: give a FinalValue, a Misfit or a TimeIntegral, or a list of them, which are added"
             )
-    if not found:
+    if not terms:
         raise ValueError("the scalar has no terms: give a FinalValue, a Misfit or a TimeIntegral")
-    return found
-
+    return terms

@@ -119,7 +119,7 @@ def of_run(
     """The derivatives of a run that has finished; course: its parts between events; outputs: of its channels."""
     derivatives, events = Following(gated, settings, trajectory, outputs)(course)
     return Sensitivities(
-        trajectory.t, outputs.names, outputs.units, outputs.values, tuple(each.name for each in gated.numbers),
-        np.array([each.value for each in gated.numbers]), derivatives,
-        tuple(EventSensitivity(*each) for each in events), trajectory,
+        trajectory.t, outputs.names, outputs.units, outputs.values, tuple(number.name for number in gated.numbers),
+        np.array([number.value for number in gated.numbers]), derivatives,
+        tuple(EventSensitivity(*event) for event in events), trajectory,
     )  # fmt: skip

@@ -86,14 +86,14 @@ class Systems:
         values have changed that depend on the numbers."""
         assert self._known is not None  # a run begins with `first`
         plant = system.with_numbers(system.scene)
-        chosen = [k for k, each in enumerate(numbers) if each is not None]
+        chosen = [k for k, number in enumerate(numbers) if number is not None]
         same = not anew and chosen == self._chosen
-        taken = [_taken_over(self._known.system, plant, each) if same else None for each in self._known.duals]
-        if all(each is not None for each in taken):
-            found = KnownTables(plant, [each for each in taken if each is not None])
+        taken = [_taken_over(self._known.system, plant, dual) if same else None for dual in self._known.duals]
+        if all(table is not None for table in taken):
+            found = KnownTables(plant, [table for table in taken if table is not None])
             _alike(found.duals)
         else:
-            parameters = Parameters(system, [each for each in numbers if each is not None], starts=False)
+            parameters = Parameters(system, [number for number in numbers if number is not None], starts=False)
             found = _known(parameters, parameters.arranged(chosen, self._scales))
         self._known, self._chosen = found, chosen
         if found.system.closures is not None:  # the rows that are independent here
@@ -105,27 +105,27 @@ class Systems:
         them: those that are taken over have neither."""
         if not held and not known.system.scene.controllers:
             return Blocks(known.system, known.duals, len(self._scales))
-        found = []
-        for b, each in enumerate(known.duals):
-            functions = each.constants.function.copy()
+        blocks = []
+        for b, dual in enumerate(known.duals):
+            functions = dual.constants.function.copy()
             for name, rates in held.items():
                 set_lanes(functions["data"][_function_of(known.system, name), :1], rates[None], b)
-            found.append(each._replace(constants=replace(each.constants, function=functions)))
-        _alike(found)
-        return Blocks(known.system, found, len(self._scales))
+            blocks.append(dual._replace(constants=replace(dual.constants, function=functions)))
+        _alike(blocks)
+        return Blocks(known.system, blocks, len(self._scales))
 
 
 def _known(parameters: Parameters, tables: Sequence[ParameterBlock]) -> KnownTables:
     """The tables of a system that are arranged along directions."""
     plant = parameters.plant
     assert isinstance(plant, System)  # it is the same one with its functions of time kept apart
-    return KnownTables(plant, [DualTables(each.constants, each.closures) for each in tables])
+    return KnownTables(plant, [DualTables(table.constants, table.closures) for table in tables])
 
 
 def _alike(duals: Sequence[DualTables]) -> None:
     """Give the tables of all blocks the features of any, so that they share kernels."""
-    broaden([each.constants for each in duals])
-    closures = [each.closures for each in duals if each.closures is not None]
+    broaden([dual.constants for dual in duals])
+    closures = [dual.closures for dual in duals if dual.closures is not None]
     if closures:
         broaden(closures)
 
@@ -150,24 +150,24 @@ def _taken_over(before: System, now: System, duals: DualTables) -> DualTables | 
 def _with_derivatives(before: Any, now: Any, duals: Any) -> dict[str, Any] | None:
     """The arrays of a table in duals, with the derivatives of a table before that has the same numbers; None if it does
     not. Functions of time may differ where they have no derivatives."""
-    found = {}
-    for each in fields(now):
-        old, new, known = (getattr(of, each.name) for of in (before, now, duals))
+    derivatives = {}
+    for field in fields(now):
+        old, new, known = (getattr(of, field.name) for of in (before, now, duals))
         wide = as_duals(new)
         for part, name in _floats(wide, new):
             source, one, other = (array if name is None else array[name] for array in (known, old, new))
-            if each.name in _OF_TIME:
+            if field.name in _OF_TIME:
                 if np.any(source[..., 1:]):
                     return None
             elif not np.array_equal(one, other):
                 return None
             else:
                 part[...] = source
-        if each.name == "body":
+        if field.name == "body":
             for name in _DIAGONAL:
                 wide[name] = known[name]
-        found[each.name] = wide
-    return found
+        derivatives[field.name] = wide
+    return derivatives
 
 
 def _function_of(system: System, coordinate: str) -> int:

@@ -84,12 +84,20 @@ def uncertainty(
     a fit with parameters that it could not identify, and what `sensitivities` raises.
     """
     names, covariance = _covariance(given, correlation)
-    found = sensitivities(scene, t_end, names, of, method, samples=samples, **settings)
-    S = found.derivatives
+    spread = sensitivities(scene, t_end, names, of, method, samples=samples, **settings)
+    S = spread.derivatives
     contributions = S * (S @ covariance)
     sigma = np.sqrt(np.maximum(np.sum(contributions, axis=-1), 0.0))
     return Uncertainties(
-        found.t, found.outputs, found.units, found.values, sigma, found.parameters, covariance, contributions, found
+        spread.t,
+        spread.outputs,
+        spread.units,
+        spread.values,
+        sigma,
+        spread.parameters,
+        covariance,
+        contributions,
+        spread,
     )
 
 
@@ -103,7 +111,7 @@ def _covariance(given: Mapping[str, float] | Fit, correlation: Any) -> tuple[tup
         return given.parameters, given.covariance
     if not isinstance(given, Mapping):
         raise TypeError(f"given is {type(given).__name__}: give standard deviations by name, or what `fit` found")
-    sigma = np.array([arguments.number(f'given["{name}"]', each) for name, each in given.items()])
+    sigma = np.array([arguments.number(f'given["{name}"]', sigma_of) for name, sigma_of in given.items()])
     if not len(sigma):
         raise ValueError("no parameters are given: give standard deviations by name")
     if not np.all(sigma >= 0.0):

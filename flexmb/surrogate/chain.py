@@ -23,7 +23,9 @@ class NodePlace(NamedTuple):
 
 def beams_named(scene: Scene, body: str | None) -> list[BeamBody]:
     """The beam `body` in a list, or all beams if None. ValueError if there is no such beam."""
-    beams = [each for each in scene.bodies if isinstance(each, BeamBody) and body in (None, each.name)]
+    beams = [
+        candidate for candidate in scene.bodies if isinstance(candidate, BeamBody) and body in (None, candidate.name)
+    ]
     if body is not None and not beams:
         raise ValueError(_no_beam(scene, body))
     return beams
@@ -59,12 +61,14 @@ def in_pieces(
         if hinge is inboard:
             hinges += joints
     bodies: list[Body] = []
-    for each in scene.bodies:
-        bodies += pieces if each is beam else [each]
-    closures = tuple(moved(moved(each, "body_a", "node_a"), "body_b", "node_b") for each in scene.closures)
+    for body in scene.bodies:
+        bodies += pieces if body is beam else [body]
+    closures = tuple(moved(moved(closure, "body_a", "node_a"), "body_b", "node_b") for closure in scene.closures)
     connectors = tuple(
-        moved(moved(each, "body_a", "node_a"), "body_b", "node_b") if isinstance(each, BetweenNodes) else each
-        for each in scene.connectors
+        moved(moved(connector, "body_a", "node_a"), "body_b", "node_b")
+        if isinstance(connector, BetweenNodes)
+        else connector
+        for connector in scene.connectors
     )
     on_bodies = {
         key: tuple(moved(item, "body", "node") for item in getattr(scene, key))
@@ -96,7 +100,7 @@ def stiffness_damping(beam: BeamBody) -> float:
 
 def _no_beam(scene: Scene, name: str) -> str:
     """The message that `name` is not a beam."""
-    found = next((each for each in scene.bodies if each.name == name), None)
+    found = next((body for body in scene.bodies if body.name == name), None)
     if found is None:
         return f'scene "{scene.name}" has no beam "{name}"'
     kind = type(found).__struct_config__.tag

@@ -42,4 +42,4 @@ def _cut(scene: Scene, beam: BeamBody) -> Scene:
     if any(state.body == beam.name for state in scene.modal_states):
         raise ValueError(f'beam "{beam.name}": its modal state is for other strains; cut it first, or leave that out')
     new = replace(beam, nodes=tuple(nodes), modes=replace(beam.modes, cuts=tuple(cuts)))
-    return replace(scene, bodies=tuple(new if each is beam else each for each in scene.bodies))
+    return replace(scene, bodies=tuple(new if body is beam else body for body in scene.bodies))

@@ -57,10 +57,10 @@ def _sections(body: BeamBody, x: Real) -> tuple[Real, Real, Real]:
     """Masses per length (n,), mass centres (n,3) from the axis and inertias (n,3,3) about these at x (n,)."""
     stations = sorted(body.stations, key=lambda station: station.x_m)
     at, values = [station.x_m for station in stations], np.array([inertia_on_axis(station) for station in stations])
-    found = np.zeros((len(x), 6, 6))
+    stiffness = np.zeros((len(x), 6, 6))
     for i, j in np.ndindex(6, 6):
-        found[:, i, j] = np.interp(x, at, values[:, i, j])
-    mass, com, inertia = mass_centres(found)
+        stiffness[:, i, j] = np.interp(x, at, values[:, i, j])
+    mass, com, inertia = mass_centres(stiffness)
     return mass, com, np.zeros_like(inertia) if body.points == "line" else inertia
 
 
@@ -105,7 +105,7 @@ def _lumped_beam(body: BeamBody) -> Inertia:
     parts = [*_lumps(body, body.tip_masses)]
     for node, hat in zip(nodes, (weight[:, None] * hats).T, strict=True):
         here = zip(hat, sections, strict=True)
-        parts.append(combine([Inertia(each * m, com + [node, 0.0, 0.0], each * J) for each, (m, com, J) in here]))
+        parts.append(combine([Inertia(factor * m, com + [node, 0.0, 0.0], factor * J) for factor, (m, com, J) in here]))
     return combine(parts)
 
 

@@ -23,7 +23,7 @@ def modal_points(scene: Scene) -> Scene:
     A beam of level "stiffened" also has the second-order field of its points and nodes. Raises ValueError for beams of
     level "exact", whose points do not move by modes.
     """
-    return replace(scene, bodies=tuple(_modal(each) if isinstance(each, BeamBody) else each for each in scene.bodies))
+    return replace(scene, bodies=tuple(_modal(body) if isinstance(body, BeamBody) else body for body in scene.bodies))
 
 
 def _modal(beam: BeamBody) -> ModalBody:

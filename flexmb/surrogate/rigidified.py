@@ -10,5 +10,5 @@ from flexmb.surrogate.lumping import rigid_equivalent
 
 def rigidify(scene: Scene) -> Scene:
     """The scene with rigid bodies of the same inertia and nodes in place of flexible ones, without modal states."""
-    bodies = tuple(each if isinstance(each, SidBody) else rigid_equivalent(each) for each in scene.bodies)
+    bodies = tuple(body if isinstance(body, SidBody) else rigid_equivalent(body) for body in scene.bodies)
     return replace(scene, bodies=bodies, modal_states=())

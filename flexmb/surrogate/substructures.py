@@ -122,10 +122,10 @@ def _ends(beam: BeamBody, pieces: int | Sequence[str | float]) -> list[float]:
     if isinstance(pieces, int):
         return [float(x) for x in np.linspace(0.0, beam.length_m, pieces + 1)]
     along, inside = nodes_along(beam), set()
-    for each in pieces:
-        if isinstance(each, str) and each not in along:
-            raise ValueError(f'beam "{beam.name}" has no node "{each}": {closest(each, along)}')
-        x = along[each] if isinstance(each, str) else float(each)
+    for piece in pieces:
+        if isinstance(piece, str) and piece not in along:
+            raise ValueError(f'beam "{beam.name}" has no node "{piece}": {closest(piece, along)}')
+        x = along[piece] if isinstance(piece, str) else float(piece)
         if not 0.0 < x < beam.length_m:
             raise ValueError(f'beam "{beam.name}" cannot be cut at x = {x:g} m: give places inside its length')
         inside.add(x)
@@ -165,9 +165,7 @@ def _piece(
             for lump in beam.tip_masses
             if start <= lump.x_m < end or (last and lump.x_m == end)
         ),
-        nodes=tuple(
-            replace(node, x_m=node.x_m - start) for node in beam.nodes if places[node.name].piece == number
-        ),
+        nodes=tuple(replace(node, x_m=node.x_m - start) for node in beam.nodes if places[node.name].piece == number),
     )
     if lag == 0.0 or level == "exact":
         return piece

@@ -12,14 +12,14 @@ from flexmb.system.by_unsplit_recursion import ALGORITHM as UNSPLIT
 from flexmb.tables import arguments
 
 ALGORITHMS: dict[str, DynamicsAlgorithm] = {
-    each.name: each for each in (ARTICULATED, UNSPLIT, COMPOSITE, FRISCH, FRISCH_AS_PRINTED)
+    algorithm.name: algorithm for algorithm in (ARTICULATED, UNSPLIT, COMPOSITE, FRISCH, FRISCH_AS_PRINTED)
 }
 """By name."""
 
-RUNNING = tuple(each.name for each in ALGORITHMS.values() if each.route is not None)
-ON_CHAINS = tuple(each.name for each in ALGORITHMS.values() if each.closed_motion is not None)
-WITH_JACOBIAN = tuple(each.name for each in ALGORITHMS.values() if each.jacobian)
-NESTED = tuple(each.name for each in ALGORITHMS.values() if each.errata is not None)
+RUNNING = tuple(algorithm.name for algorithm in ALGORITHMS.values() if algorithm.route is not None)
+ON_CHAINS = tuple(algorithm.name for algorithm in ALGORITHMS.values() if algorithm.closed_motion is not None)
+WITH_JACOBIAN = tuple(algorithm.name for algorithm in ALGORITHMS.values() if algorithm.jacobian)
+NESTED = tuple(algorithm.name for algorithm in ALGORITHMS.values() if algorithm.errata is not None)
 
 
 def chosen(name: str, among: Collection[str] = ALGORITHMS) -> DynamicsAlgorithm:

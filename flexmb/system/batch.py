@@ -104,7 +104,9 @@ class Batch:
         self._spare: list[LaneTables] = []
         if self.in_lanes and not self.shares_constants:
             blocks = blocks_of(self.systems)
-            self._constants = [lane_constants([each.constants.fastest(BATCHES) for each in block]) for block in blocks]
+            self._constants = [
+                lane_constants([tables.constants.fastest(BATCHES) for tables in block]) for block in blocks
+            ]
             broaden(self._constants)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -120,9 +122,9 @@ class Batch:
     def tables(self) -> Iterator[LaneTables]:
         """Tables for LANES copies, which no other thread has meanwhile. They are used again, because making them takes
         longer than evaluating a thousand copies."""
-        found = self._free_tables()
-        yield found
-        self._spare.append(found)
+        tables = self._free_tables()
+        yield tables
+        self._spare.append(tables)
 
     def _free_tables(self) -> LaneTables:
         with suppress(IndexError):
@@ -131,7 +133,7 @@ class Batch:
         entries = lane_entries(s, w.doubt)
         rhs, stages, _, workspace = addresses(lanes.rhs, STATUS, s, c, w)
         begin = 0 if self.shares_constants else addresses(lanes.begin, VOID, c, w)[0]
-        blocks = [address(each) for each in self._constants]
+        blocks = [address(constant) for constant in self._constants]
         return LaneTables(w, s, entries, lanes.lane_gate(s, entries, (rhs, begin, stages, workspace), blocks))
 
     def constants(self, block: int, w: LaneWorkspace) -> Constants:
@@ -163,8 +165,8 @@ class Batch:
 
     def initial_states(self) -> tuple[Real, Real]:
         """Coordinates (n,nq) and speeds (n,nu) of the scenes at t = 0."""
-        found = [system.initial_state for system in self.systems]
-        return np.array([state.q for state in found]), np.array([state.u for state in found])
+        states = [system.initial_state for system in self.systems]
+        return np.array([state.q for state in states]), np.array([state.u for state in states])
 
     def accelerations(self, q: Any, u: Any, t: Any = 0.0, *, threads: int | None = None) -> BatchAccelerations:
         """udot (n,nu) of all copies at coordinates q (n,nq), speeds u (n,nu) and times t (s), one or (n,).
@@ -235,10 +237,10 @@ def listed(name: str, given: Iterable[Any]) -> tuple[Any, ...]:
     """The items as a tuple; TypeError for anything that is not a collection, ValueError for an empty one."""
     if isinstance(given, str) or not isinstance(given, Iterable):
         raise TypeError(f"{name} is a {type(given).__name__}: give a list, of one for each copy")
-    found = tuple(given)
-    if not found:
+    values = tuple(given)
+    if not values:
         raise ValueError(f"a batch needs at least one of {name}")
-    return found
+    return values
 
 
 def _refuse_other_structure(i: int, system: Mechanics, first: Mechanics) -> None:

@@ -79,7 +79,7 @@ def _with_equal_points(scenes: Sequence[Scene]) -> list[Scene]:
     """The scenes, with as many default points of each curved beam as any of them has: these depend on numbers in which
     copies may differ, and are part of their structure."""
     most: dict[str, int] = {}
-    for body in (each for scene in scenes for each in scene.bodies):
+    for body in (body for scene in scenes for body in scene.bodies):
         if isinstance(body, BeamBody) and body.level == "exact" and body.modes.points is None and is_curved(body):
             most[body.name] = max(most.get(body.name, 0), points_of_piece(body))
     return [_with_points(scene, most) for scene in scenes] if most else list(scenes)

@@ -40,8 +40,8 @@ def _complex(duals: Any, lane: int) -> Any:
 
 def section_row(balance: SectionBalance, push: Pushforward, observation: Observation, lanes: slice) -> Real:
     """(6 X,lanes) derivatives of the section loads (X,6), for `Pushforward.derivatives`."""
-    found = [balance.transmitted(exerted, w).ravel() for exerted, w in _each(push, observation, lanes)]
-    return np.array(found).imag.T / SMALL
+    rows = [balance.transmitted(exerted, w).ravel() for exerted, w in _each(push, observation, lanes)]
+    return np.array(rows).imag.T / SMALL
 
 
 def load_row(
@@ -49,11 +49,11 @@ def load_row(
     lanes: slice,
 ) -> Real:  # fmt: skip
     """(6 n,lanes) derivatives of the loads of n hinges and closures in axes, about a node: those that are `seen`."""
-    found = [
+    rows = [
         np.concatenate([*referred(arrays, w, exerted.loads, *seen).values()])
         for exerted, w in _each(push, observation, lanes)
     ]
-    return np.array(found).imag.T / SMALL
+    return np.array(rows).imag.T / SMALL
 
 
 def _each(push: Pushforward, observation: Observation, lanes: slice) -> Iterator[tuple[Any, Any]]:

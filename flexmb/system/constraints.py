@@ -84,8 +84,8 @@ class Constraints:
 
     def _as_asked(self, t: float, y: Real, wish: AskedFor) -> Real:
         """y = [q, u, work] with closed closures; warns of values that it cannot keep."""
-        found = consistent(self.closures, t, y, wish)
-        broken = wish.broken(y, found)
+        state = consistent(self.closures, t, y, wish)
+        broken = wish.broken(y, state)
         if broken:
             warnings.warn(
                 f'scene "{self._system.scene.name}": the closures do not allow these values together, and the nearest '
@@ -94,7 +94,7 @@ class Constraints:
                 SceneWarning,
                 stacklevel=5,
             )
-        return found
+        return state
 
     def admissible(self, state: State, given: Given = "guess") -> State:
         """The nearest state that closes all closures, of one with prescribed motions at their values.
@@ -133,9 +133,9 @@ class Constraints:
         return finite_result(self._motion(t, y, algorithm).accelerations, t)
 
     def _motion(self, t: float, y: Real, algorithm: Algorithm) -> ClosedMotion:
-        found = self._on_chains(algorithm)(self.closures, t, y)
+        motion_of = self._on_chains(algorithm)(self.closures, t, y)
         self._system.check_precision(t, y, self.closures)
-        return found
+        return motion_of
 
     def hinge_loads(
         self, state: State, accelerations: Real | None, axes: Axes, about: tuple[str, str] | None,
@@ -166,11 +166,11 @@ class Constraints:
             there = self._system.in_axes(state, loads, axes="world", about=about)
             return np.asarray(np.sum([sign * there[name] for name, sign in signs.items()], axis=0))
 
-        found = finite_result(summed(self._by_load(motion.hinges, motion.closures)), t)
+        load = finite_result(summed(self._by_load(motion.hinges, motion.closures)), t)
         if motion.spread is None:
-            return found
-        changes = np.array([summed(each) for each in self._changes(motion.spread)])
-        return np.where(motion.spread.leaves_open(changes), np.nan, found)
+            return load
+        changes = np.array([summed(change) for change in self._changes(motion.spread)])
+        return np.where(motion.spread.leaves_open(changes), np.nan, load)
 
     def loads_across(self, state: State, axes: Axes, about: tuple[str, str] | None) -> dict[str, Real]:
         """The same loads, and also at a singular position in a run."""
@@ -182,14 +182,16 @@ class Constraints:
     ) -> dict[str, Real]:
         """Loads of a motion in other axes about a node, NaN where the motion does not determine them."""
         refer = partial(self._system.in_axes, state, axes=axes, about=about)
-        found = refer(self._by_load(motion.hinges, motion.closures))
+        referred = refer(self._by_load(motion.hinges, motion.closures))
         if motion.spread is None:
-            return {name: finite_result(load, state.t) for name, load in found.items()}
-        changes = [refer(each) for each in self._changes(motion.spread)]
-        for name, load in found.items():
+            return {name: finite_result(load, state.t) for name, load in referred.items()}
+        changes = [refer(change) for change in self._changes(motion.spread)]
+        for name, load in referred.items():
             finite_result(load, state.t)
-            found[name] = np.where(motion.spread.leaves_open(np.array([each[name] for each in changes])), np.nan, load)
-        return found
+            referred[name] = np.where(
+                motion.spread.leaves_open(np.array([change[name] for change in changes])), np.nan, load
+            )
+        return referred
 
     def _by_load(self, hinges: NDArray[Any], closures: NDArray[Any]) -> dict[str, NDArray[Any]]:
         """Rows for hinges (N,6) and closures (C,6) by their names."""
@@ -198,16 +200,16 @@ class Constraints:
 
     def _changes(self, spread: Spread) -> list[dict[str, Real]]:
         """For each null load the changes (6,) of the loads by name, World axes."""
-        return [self._by_load(*each) for each in zip(spread.hinges, spread.closures, strict=True)]
+        return [self._by_load(*rows) for rows in zip(spread.hinges, spread.closures, strict=True)]
 
     def all_loads(self, t: float, y: Real) -> AllLoads:
         """With the changes by null loads of redundant closures; `exerted` has the minimum-norm loads."""
         motion, system = self._motion(t, y, "articulated"), self._system
-        found = system.observation.evaluation(self._row_of(t, y, motion._replace(spread=None)))
-        system.inverse_at(t, y, found.accelerations)
+        evaluation = system.observation.evaluation(self._row_of(t, y, motion._replace(spread=None)))
+        system.inverse_at(t, y, evaluation.accelerations)
         spread = motion.spread
         more = () if spread is None else (self._changes(spread), spread.rounding)
-        return AllLoads(t, found, system.own_workspace, *more)
+        return AllLoads(t, evaluation, system.own_workspace, *more)
 
     def evaluation(self, t: float, y: Real, algorithm: Algorithm) -> Evaluation:
         """Everything observable at y = [q, u, work]."""
@@ -238,7 +240,7 @@ class Constraints:
         slope, system = np.empty_like(y), self._system
         articulated.rhs(t, y, slope, system.constants, system.workspace())
         sides = [self.closures.beside(t, y, slope[: system.nq], side) for side in (-1, 1)]
-        before, after = (self._motion(*each, algorithm) for each in sides)
+        before, after = (self._motion(*side, algorithm) for side in sides)
         means = (0.5 * (one + other) for one, other in zip(before[:-1], after[:-1], strict=True))
         return ClosedMotion._make((*means, _of_both(before.spread, after.spread)))
 

@@ -136,24 +136,24 @@ def by_names(
     """From a row (E,) and its derivatives (E,k); `split` makes those (...,k) of one quantity a record."""
     names, k = observation.names, change.shape[-1]
     now = parts(row, observation.columns)
-    found = {name: change[at].reshape(*shape, k) for name, (at, shape) in observation.columns.items()}
+    changes = {name: change[at].reshape(*shape, k) for name, (at, shape) in observation.columns.items()}
 
     def each(group: Iterable[str], part: str) -> dict[str, By]:
-        return {name: split(found[part][i]) for i, name in enumerate(group)}
+        return {name: split(changes[part][i]) for i, name in enumerate(group)}
 
     return EvaluationDerivatives(
-        accelerations=split(found["rates"]),
+        accelerations=split(changes["rates"]),
         markers={
-            name: _of_marker(now["markers"][i, 3:12], found["markers"][i], split)
+            name: _of_marker(now["markers"][i, 3:12], changes["markers"][i], split)
             for i, name in enumerate(names.markers)
         },
         loads=each(names.hinges, "loads") | each(names.closures, "closures"),
         wheel_loads=each(names.wheels, "wheel_loads"),
-        drives={name: split(found["drives"][places]) for name, places in names.driven.items()},
+        drives={name: split(changes["drives"][places]) for name, places in names.driven.items()},
         energy=each(ENERGIES, "energy"),
-        momentum=split(found["momentum"]),
+        momentum=split(changes["momentum"]),
         connectors=each(names.connectors, "connectors"),
-        hinge_forces={name: split(found["hinge_forces"][i : i + 1]) for i, name in enumerate(names.hinge_forces)},
+        hinge_forces={name: split(changes["hinge_forces"][i : i + 1]) for i, name in enumerate(names.hinge_forces)},
     )
 
 

@@ -77,7 +77,7 @@ def unfollowed(arrays: SceneArrays, t: Real, q: Real) -> Iterator[Unfollowed]:
             continue
         eta = q[:, arrays.coordinate(f"{body.name}.modes")]
         most = [_error(body, eta[i], float(t[i]), turn) for i, turn in _suspects(field, eta)]
-        yield from sorted((each for each in most if each is not None), key=lambda each: -each.size)[:1]
+        yield from sorted((finding for finding in most if finding is not None), key=lambda finding: -finding.size)[:1]
 
 
 def weights(field: StrainField) -> Real:
@@ -89,7 +89,7 @@ def _suspects(field: StrainField, eta: Real) -> list[tuple[int, float]]:
     """The numbers of the strains eta (T,m) that are worth a closer look, at most two, and their turn (rad) in all."""
     turns = np.linalg.norm(np.einsum("jam,tm->tja", field.rows[: field.steps, WHOLE], eta), axis=2)
     largest, whole = turns.max(axis=1), turns.sum(axis=1)
-    found = {int(np.argmax(each)) for each in (largest, whole)}
+    found = {int(np.argmax(sizes)) for sizes in (largest, whole)}
     return [(i, float(whole[i])) for i in sorted(found) if largest[i] > SMALL_TURN]
 
 

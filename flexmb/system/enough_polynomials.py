@@ -67,7 +67,7 @@ def unresolved(arrays: SceneArrays, t: Real, q: Real) -> Iterator[Unresolved]:
         if body is None or field is None or field.columns is None:
             continue
         eta = q[:, arrays.coordinate(f"{body.name}.modes")]
-        found = max(_worst(body, t, np.abs(eta @ field.columns.T)), key=lambda each: each.position, default=None)
+        found = max(_worst(body, t, np.abs(eta @ field.columns.T)), key=lambda finding: finding.position, default=None)
         if found is not None and found.position > ALLOWED * body.length_m:
             yield found
 
@@ -98,7 +98,7 @@ def _worst(body: BeamBody, t: Real, size: Real) -> Iterator[Unresolved]:
             column += count
     for piece, length in enumerate(lengths):
         own = {strain: blocks[strain, piece] for strain in CURVATURES if (strain, piece) in blocks}
-        turn = at_rest[piece] + length * np.linalg.norm([each[:, 0] for each in own.values()], axis=0)
+        turn = at_rest[piece] + length * np.linalg.norm([strains[:, 0] for strains in own.values()], axis=0)
         for strain, each in own.items():
             if (count := each.shape[1]) > 1:
                 first, rate = _left_out(each, turn)

@@ -136,5 +136,5 @@ class MassMatrixFactors:
         _, w, x = self._factors
         apply(self._c, w, x, rows)
         finite_result(rows, self._t)
-        found: Real = rows[0] if b.ndim == 1 else rows.T
-        return found
+        solution: Real = rows[0] if b.ndim == 1 else rows.T
+        return solution

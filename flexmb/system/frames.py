@@ -104,10 +104,10 @@ def deformed(at: FlexibleNode, eta: Real, field: StrainField | None) -> tuple[Re
 
 def hinge_frames(arrays: SceneArrays, w: MotionTables) -> dict[str, HingeFrames]:
     """The frames of every hinge and point mass, and of closures: frames A and B, and the origin of B."""
-    found = {link.hinge.name: hinge_frames_of(arrays, w, k) for k, link in enumerate(arrays.links)}
-    found |= {coupling.name: found[coupling.hinge] for coupling in arrays.scene.couplings}
+    frames = {link.hinge.name: hinge_frames_of(arrays, w, k) for k, link in enumerate(arrays.links)}
+    frames |= {coupling.name: frames[coupling.hinge] for coupling in arrays.scene.couplings}
     closures = enumerate(arrays.scene.closures)
-    return found | {closure.name: closure_frames_of(arrays, w, i) for i, closure in closures}
+    return frames | {closure.name: closure_frames_of(arrays, w, i) for i, closure in closures}
 
 
 def closure_frames_of(arrays: SceneArrays, w: MotionTables, i: int) -> HingeFrames:
@@ -124,9 +124,7 @@ def hinge_frames_of(arrays: SceneArrays, w: MotionTables, k: int) -> HingeFrames
     inward, outward = int(body["inboard_port"]), int(body["outboard_port"])
     placed = body["placement_rotation"].reshape(3, 3) if inward < 0 else _port(w, inward)[0]
     turn, arm = (np.eye(3), np.zeros(3)) if outward < 0 else _port(w, outward)
-    return HingeFrames(
-        parent.rotation @ placed @ back, own.rotation @ turn @ back, own.position + own.rotation @ arm
-    )
+    return HingeFrames(parent.rotation @ placed @ back, own.rotation @ turn @ back, own.position + own.rotation @ arm)
 
 
 def _of_side(w: MotionTables, side: Side, body: int, port: int) -> Pose:
@@ -143,6 +141,8 @@ def _port(w: MotionTables, port: int) -> tuple[Real, Real]:
 
 
 def _without_node(arrays: SceneArrays, body: str, node: str) -> str:
-    found = next((each for each in arrays.scene.bodies if each.name == body), None)  # none for a point mass
-    nodes = "" if found is None or isinstance(found, SidBody) else f'; its nodes are {", ".join(node_names(found))}'
+    found = next(
+        (candidate for candidate in arrays.scene.bodies if candidate.name == body), None
+    )  # none for a point mass
+    nodes = "" if found is None or isinstance(found, SidBody) else f"; its nodes are {', '.join(node_names(found))}"
     return f'body "{body}" has no node "{node}"{nodes}'

@@ -73,12 +73,12 @@ def unstretched(system: System, t: Real, q: Real, u: Real, loads: Mapping[str, R
         return
     force, turn = _largest(system, u, loads)
     for body in held:
-        weight = body.length_m**2 * max(mass_per_length(each) for each in body.stations)
-        least = min(float(stiffness_on_axis(each)[EXTENSION, EXTENSION]) for each in body.stations)
+        weight = body.length_m**2 * max(mass_per_length(station) for station in body.stations)
+        least = min(float(stiffness_on_axis(station)[EXTENSION, EXTENSION]) for station in body.stations)
         suspects = (force + weight * turn**2) / least
         order = np.argsort(-suspects, kind="stable")[:LOOKED_AT]
-        found = [_stretched(system, body, State(q[n], u[n], float(t[n]))) for n in order if suspects[n] > ALLOWED]
-        worst = max(found, key=lambda each: abs(each.strain), default=None)
+        findings = [_stretched(system, body, State(q[n], u[n], float(t[n]))) for n in order if suspects[n] > ALLOWED]
+        worst = max(findings, key=lambda finding: abs(finding.strain), default=None)
         if worst is not None and abs(worst.strain) > ALLOWED:
             yield worst
 
@@ -96,8 +96,8 @@ def _stretched(system: System, body: BeamBody, state: State) -> Unstretched:
     places, weights = gauss_rule(_SECTIONS)
     balance = SectionBalance(system, body.name, body.length_m * (1.0 + places) / 2.0)
     try:
-        found = balance.loads(balance.at(system.all_loads(state))).strain[:, 0]
+        strain = balance.loads(balance.at(system.all_loads(state))).strain[:, 0]
     except DynamicsError:
         return Unstretched(body.name, state.t, 0.0)  # a run that failed says so itself
-    mean = float(weights @ found / 2.0)
+    mean = float(weights @ strain / 2.0)
     return Unstretched(body.name, state.t, mean if np.isfinite(mean) else 0.0)

@@ -33,7 +33,7 @@ def refuse_kinks(arrays: SceneArrays, w: Workspace) -> None:
     by time are those on the side that the function itself belongs to.
     """
     c = arrays.constants
-    springs = (each for each in arrays.scene.connectors if isinstance(each, HingeSpring))
+    springs = (connector for connector in arrays.scene.connectors if isinstance(connector, HingeSpring))
     for spring, row in zip(springs, c.hinge_spring, strict=True):
         q = float(w.q[c.speed["coordinate"][row["speed"]]])
         for limit in (float(row["lower"]), float(row["upper"])):

@@ -111,11 +111,11 @@ class Linearisation:
         observation = self._system.observation
         change = push.derivatives(motion, directions, partial(load_row, self._system, push, observation, seen))
         names = *observation.names.hinges, *observation.names.closures
-        found = dict(zip(names, finite_result(change, t).reshape(len(names), 6, -1), strict=True))
+        changes = dict(zip(names, finite_result(change, t).reshape(len(names), 6, -1), strict=True))
         if self._constraints is not None:
             for name, load in self._constraints.hinge_loads(state, None, axes, about).items():
-                found[name][np.isnan(load)] = np.nan
-        return {name: _split(self._system.nu, OfFreeMotion, each) for name, each in found.items()}
+                changes[name][np.isnan(load)] = np.nan
+        return {name: _split(self._system.nu, OfFreeMotion, block) for name, block in changes.items()}
 
     def of_section_loads(self, state: State, body: str, x: Any) -> OfFreeMotion:
         """See `System.section_load_derivatives`."""
@@ -123,10 +123,10 @@ class Linearisation:
         balance, push = SectionBalance(self._system, body, x), self._pushforward
         motion, directions = self._freely(t, y)
         change = push.derivatives(motion, directions, partial(section_row, balance, push, self._system.observation))
-        found = finite_result(change, t).reshape(len(balance.x), 6, change.shape[-1])
+        changes = finite_result(change, t).reshape(len(balance.x), 6, change.shape[-1])
         if self._constraints is not None:
-            found[np.isnan(balance.at(self._constraints.all_loads(t, y)))] = np.nan
-        return _split(self._system.nu, OfFreeMotion, found)
+            changes[np.isnan(balance.at(self._constraints.all_loads(t, y)))] = np.nan
+        return _split(self._system.nu, OfFreeMotion, changes)
 
     # The motion, and what changes with it
 
@@ -154,8 +154,8 @@ class Linearisation:
             return np.zeros(self._system.nu)
         motion, push = GivenMotion(t, y, rates, np.zeros(self._row_count)), self._pushforward
         later = self._directions(np.zeros((self._system.nq, 0)), 0)
-        found = push.derivatives(motion, later, lambda lanes: push.x.tau[:, lanes])
-        return finite_result(found, t)[:, 0]
+        derivatives = push.derivatives(motion, later, lambda lanes: push.x.tau[:, lanes])
+        return finite_result(derivatives, t)[:, 0]
 
     @per_thread
     def _pushforward(self) -> Pushforward:
@@ -288,10 +288,10 @@ class Linearisation:
         changes, then time, at the same accelerations and loads."""
         k, nq, nu = N.shape[1], self._system.nq, self._system.nu
         state, rates, loads = (np.zeros((n, 2 * k + others + 1)) for n in (nq + nu, nu, self._row_count))
-        found = Directions(state, rates, loads, np.zeros(2 * k + others + 1))
-        found.state[:nq, :k], found.state[nq:, k : 2 * k] = N, np.eye(nu, k)
-        found.time[-1] = 1.0
-        return found
+        directions = Directions(state, rates, loads, np.zeros(2 * k + others + 1))
+        directions.state[:nq, :k], directions.state[nq:, k : 2 * k] = N, np.eye(nu, k)
+        directions.time[-1] = 1.0
+        return directions
 
     def _relieve_drives(self, change: Real) -> None:
         """A force along a prescribed speed relieves its drive, and does nothing else."""

@@ -24,14 +24,14 @@ def held_by(scene: Scene, joints: Sequence[str], on: str) -> dict[str, float]:
         raise ValueError(f"joints is {joints!r}: give the names of hinges and closures, each once")
     sides = {hinge.name: (hinge.parent, hinge.child) for hinge in scene.hinges}
     sides |= {closure.name: (closure.body_a, closure.body_b) for closure in scene.closures}
-    found = {}
+    carriers = {}
     for name in joints:
         if name not in sides:
             raise ValueError(f"there is no hinge or closure {name!r}; there are {', '.join(sorted(sides))}")
         if on not in sides[name] or sides[name][0] == sides[name][1]:
             raise ValueError(f'"{name}" joins "{sides[name][0]}" and "{sides[name][1]}": its load on {on!r} is none')
-        found[name] = 1.0 if on == sides[name][1] else -1.0
-    return found
+        carriers[name] = 1.0 if on == sides[name][1] else -1.0
+    return carriers
 
 
 def referred(

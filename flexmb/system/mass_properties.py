@@ -66,8 +66,8 @@ def mass_properties(arrays: SceneArrays, w: Workspace, inertias: Real, body: str
         counted, frame = _carried(parent.tolist(), first), body_pose(arrays, w, first)
     else:
         raise ValueError(f'there is no body "{body}": {closest(body, names)}')
-    found = zip(*(_of_link(inertias[k]) for k in counted), strict=True)
-    mass, first_moment, inertia = (np.array(each) for each in found)
+    parts = zip(*(_of_link(inertias[k]) for k in counted), strict=True)
+    mass, first_moment, inertia = (np.array(part) for part in parts)
     poses = [link_pose(w, k) for k in counted]
     R, origins = np.array([pose.rotation for pose in poses]), np.array([pose.position for pose in poses])
     own = np.divide(first_moment, mass[:, None], out=np.zeros_like(first_moment), where=mass[:, None] > 0.0)
@@ -83,11 +83,11 @@ def mass_properties(arrays: SceneArrays, w: Workspace, inertias: Real, body: str
 
 def _carried(parent: list[int], first: int) -> list[int]:
     """A body and all that it carries; parents precede their children, and bodies precede point masses."""
-    found = {first}
+    bodies = {first}
     for k in range(first + 1, len(parent)):
-        if parent[k] in found:
-            found.add(k)
-    return sorted(found)
+        if parent[k] in bodies:
+            bodies.add(k)
+    return sorted(bodies)
 
 
 def _of_link(inertia: Real) -> tuple[float, Real, Real]:

@@ -348,10 +348,10 @@ class Mechanics(SceneArrays):
     @kept
     def _is_modal(self) -> NDArray[np.bool_]:
         """Which entries of u (nu,) are modal."""
-        found = np.zeros(self.nu, bool)
+        flags = np.zeros(self.nu, bool)
         for k in np.flatnonzero(self.constants.body["modes"]).tolist():
-            found[self._modes(k)] = True
-        return found
+            flags[self._modes(k)] = True
+        return flags
 
     def _modes(self, k: int) -> slice:
         body = self.constants.body[k]

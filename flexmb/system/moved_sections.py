@@ -48,7 +48,7 @@ def moved_sections(field: StrainField, eta: Real, etad: Real, etadd: Real) -> Mo
     at, at_rest = field.gauss, field.tangent[field.gauss]
     w = omega[at]
     tangent, stretching, again = (
-        np.einsum("nab,nb->na", R[at], each) for each in (at_rest + g[at], g_rate[at], g_again[at])
+        np.einsum("nab,nb->na", R[at], vector) for vector in (at_rest + g[at], g_rate[at], g_again[at])
     )
     turned = np.cross(w, tangent)
     bent = np.cross(alpha[at], tangent) + np.cross(w, turned + 2.0 * stretching) + again

@@ -72,9 +72,9 @@ class Evaluation:
 def undetermined_loads(loads: Mapping[str, Real], drives: Mapping[str, Real]) -> dict[str, NDArray[np.bool_]]:
     """Which components (6,) of the load of a hinge or closure are NaN at one time or more, by its name; and which of
     its drive loads (n,), by "<name>.drive". Only names with such components are listed."""
-    found = dict(loads) | {f"{name}.drive": values for name, values in drives.items()}
-    open_ = {name: np.any(np.isnan(np.atleast_2d(values)), axis=0) for name, values in found.items()}
-    return {name: each for name, each in open_.items() if np.any(each)}
+    open_loads = dict(loads) | {f"{name}.drive": values for name, values in drives.items()}
+    open_ = {name: np.any(np.isnan(np.atleast_2d(values)), axis=0) for name, values in open_loads.items()}
+    return {name: flags for name, flags in open_.items() if np.any(flags)}
 
 
 @dataclass(frozen=True)
@@ -127,10 +127,10 @@ class Observation:
 
     def undetermined(self, parts: Mapping[str, Flags]) -> Flags:
         """Which entries of a row (width,) are undetermined, from those of some of its parts."""
-        found = np.zeros(self.width, bool)
+        flags = np.zeros(self.width, bool)
         for name, is_open in parts.items():
-            found[self.columns[name][0]] = is_open.ravel()
-        return found
+            flags[self.columns[name][0]] = is_open.ravel()
+        return flags
 
     def evaluation(self, row: Real) -> Evaluation:
         """A row (width,) by the names of the scene; arrays are parts of it."""

@@ -77,14 +77,14 @@ class Pushforward:
         """(m,k) derivatives of m numbers; `read` takes those of at most eight directions from the tables, at this
         slice of the last axis of arrays of duals, whose first entry is the value. DynamicsError for connectors beyond
         their range."""
-        found = []
+        derivatives = []
         for first in range(0, max(1, len(directions.time)), LANES):
             some = slice(first, min(first + LANES, len(directions.time)))
             lanes = slice(1, 1 + some.stop - some.start)
             self._set(at, directions, some, lanes)
             self._check(self._observe(), int(self.w.fault[0]))
-            found.append(np.array(read(lanes)))
-        return np.hstack(found)
+            derivatives.append(np.array(read(lanes)))
+        return np.hstack(derivatives)
 
     def value(self, at: GivenMotion) -> Real:
         """The row (E,) of a motion."""

@@ -130,10 +130,12 @@ class SceneArrays:
         hinges = [link.hinge.name for link in self.links]
         on_bodies = [wheel.name for link in self.links for wheel in wheels.get(link.name, ())]
         closures = [closure.name for closure in scene.constraints]
-        between = [each.name for each in between_nodes(scene)]
-        along_hinges = [each for each in scene.connectors if isinstance(each, AlongHinge)]
-        along_hinges.sort(key=lambda each: not isinstance(each, HingeSpring))  # springs come first, as in the tables
-        along = [each.name for each in along_hinges]
+        between = [node.name for node in between_nodes(scene)]
+        along_hinges = [connector for connector in scene.connectors if isinstance(connector, AlongHinge)]
+        along_hinges.sort(
+            key=lambda connector: not isinstance(connector, HingeSpring)
+        )  # springs come first, as in the tables
+        along = [hinge.name for hinge in along_hinges]
         return Names(self.markers, hinges, on_bodies, closures, self._driven([*hinges, *on_bodies]), between, along)
 
     def _driven(self, names: list[str]) -> dict[str, Index]:

@@ -167,12 +167,12 @@ class SectionBalance:
         DynamicsError where a number is not finite.
         """
         t, exerted, w, changes, rounding = state
-        found = finite_result(self.transmitted(exerted, w), t)
-        is_open = np.zeros(found.shape, bool)
+        loads = finite_result(self.transmitted(exerted, w), t)
+        is_open = np.zeros(loads.shape, bool)
         for change in changes:
             other = {name: load + change[name] for name, load in exerted.loads.items()}
-            is_open |= np.abs(self.transmitted(replace(exerted, loads=other), w) - found) > rounding
-        return np.where(is_open, np.nan, found)
+            is_open |= np.abs(self.transmitted(replace(exerted, loads=other), w) - loads) > rounding
+        return np.where(is_open, np.nan, loads)
 
     def transmitted(self, exerted: Evaluation, w: MotionTables) -> Real:
         """Loads (X,6) of `SectionLoads` that balance the momentum of a motion and the loads that others exert.
@@ -218,13 +218,13 @@ class SectionBalance:
         arrays, k, scene = self._arrays, self._k, self._arrays.scene
         loads, wheels = exerted.loads, exerted.wheel_loads
         constants = arrays.constants
-        found: list[_Outer] = []
+        outer: list[_Outer] = []
 
         def add(node: str, torque: Real, force: Real, point: Real, *, at: bool = True) -> None:
             x = place_along(self._beam, node)
             beyond = int(np.searchsorted(self._cuts, x, side="right" if at else "left"))
             about = torque + np.cross(point - pose.position, force)
-            found.append(_Outer(beyond, np.concatenate([pose.rotation.T @ about, pose.rotation.T @ force])))
+            outer.append(_Outer(beyond, np.concatenate([pose.rotation.T @ about, pose.rotation.T @ force])))
 
         own = arrays.links[k]
         load = loads[own.hinge.name]  # a section at the hinge itself transmits its load: the hinge is not beyond
@@ -234,11 +234,11 @@ class SectionBalance:
             add(link.inboard_end.node, -load[:3], -load[3:], hinge_frames_of(arrays, w, j).point)
         carrier = link_pose(w, k)
         rows = range(int(constants.body[k]["wheel_start"]), int(constants.body[k]["wheel_stop"]))
-        for wheel, row in zip((each for each in scene.wheels if each.body == self.body), rows, strict=True):
+        for wheel, row in zip((wheel for wheel in scene.wheels if wheel.body == self.body), rows, strict=True):
             centre = carrier.position + carrier.rotation @ w.port["r"][constants.wheel[row]["port"]]
             add(wheel.node, -wheels[wheel.name][:3], -wheels[wheel.name][3:], centre)
         rows = range(int(constants.body[k]["load_start"]), int(constants.body[k]["load_stop"]))
-        for load_of, row in zip((each for each in scene.loads if each.body == self.body), rows, strict=True):
+        for load_of, row in zip((load for load in scene.loads if load.body == self.body), rows, strict=True):
             table = constants.load[row]
             port, value = table["port"], w.function[table["function"], 0] * table["direction"]
             if table["frame"] == NODE_AXES:
@@ -260,7 +260,7 @@ class SectionBalance:
                 if side.body == self.body:
                     load = sign * loads[closure.name]
                     add(side.node, load[:3], load[3:], closure_frames_of(arrays, w, i).point)
-        return found
+        return outer
 
 
 class _Motion(NamedTuple):
@@ -303,8 +303,8 @@ def _moved(s: BeamSections, eta: Real, etad: Real, etadd: Real) -> tuple[_Moved,
             axis[:, 0] += s.x
             return _Moved(points.position + r, v, a, *turns), (axis, rotation_along(theta))
         case ByStrains(field=field, points=at, cuts=cuts, rotation=rotation):
-            found = moved_sections(field, eta, etad, etadd)
-            return _Moved(*(each[at] for each in found)), (found.r[cuts], found.R[cuts] @ rotation)
+            moved = moved_sections(field, eta, etad, etadd)
+            return _Moved(*(quantity[at] for quantity in moved)), (moved.r[cuts], moved.R[cuts] @ rotation)
         case _:
             assert_never(s.motion)
 
@@ -312,7 +312,7 @@ def _moved(s: BeamSections, eta: Real, etad: Real, etadd: Real) -> tuple[_Moved,
 def _in_sections(wrench: Real, axis: Real, R: Real) -> Real:
     """Wrenches (X,6) about the body's origin in body axes, referred to sections at `axis` (X,3) with axes R (X,3,3)."""
     torque = wrench[:, :3] - np.cross(axis, wrench[:, 3:])
-    return np.hstack([np.einsum("nba,nb->na", R, each) for each in (torque, wrench[:, 3:])])
+    return np.hstack([np.einsum("nba,nb->na", R, vector) for vector in (torque, wrench[:, 3:])])
 
 
 def _field(
@@ -339,7 +339,7 @@ def _lumped(beam: BeamBody) -> str:
 
 
 def _beam(arrays: SceneArrays, body: str) -> BeamBody:
-    beams = {each.name: each for each in arrays.scene.bodies if isinstance(each, BeamBody)}
+    beams = {body.name: body for body in arrays.scene.bodies if isinstance(body, BeamBody)}
     if body not in beams:
         raise ValueError(f'"{body}" is no beam of the scene; these are: {", ".join(beams) or "none"}')
     return beams[body]

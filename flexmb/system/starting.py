@@ -48,8 +48,8 @@ def _watched(system: System, start: State, t_end: float) -> Iterator[Doubt]:
 
     t = np.linspace(start.t, t_end, LOOKED_AT)
     y = np.tile(pack(start), (len(t), 1))
-    for each, row in zip(t, y, strict=True):
-        system.project(float(each), row, system.constants)  # to prescribed coordinates and speeds
+    for time, row in zip(t, y, strict=True):
+        system.project(float(time), row, system.constants)  # to prescribed coordinates and speeds
     q, u = y[:, : system.nq], y[:, system.nq : -1]
     place = {body.name: place for place, body in entries(system.scene, "bodies")}
     for each in said(WatchedStates(system, t, q, u, lambda n: system.turns(float(t[n]), q[n], u[n]))):

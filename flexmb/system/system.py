@@ -337,10 +337,10 @@ class System(Mechanics):
 
         if self._operators is None:
             self._operators = SpatialOperators(self.scene)
-        found = self._operators.at(t, y[: self.nq], y[self.nq : -1])
-        for part in (found.M_m, found.a_m, found.b_m, found.V_m):
+        operators = self._operators.at(t, y[: self.nq], y[self.nq : -1])
+        for part in (operators.M_m, operators.a_m, operators.b_m, operators.V_m):
             finite_result(part, t)
-        return found
+        return operators
 
     def accelerations_batch(self, q: Any, u: Any, t: Any = 0.0, *, threads: int | None = None) -> BatchAccelerations:
         """udot (n,nu) of many states at once, and a status (n,) for each: see `flexmb.system.batch.Batch`.
@@ -354,12 +354,12 @@ class System(Mechanics):
     @property
     def batch(self) -> Batch:
         """Any number of copies of this system."""
-        found: Batch | None = self.kept.get("batch")
-        if found is None:
+        batch: Batch | None = self.kept.get("batch")
+        if batch is None:
             from flexmb.system.batch import Batch  # imported here, because only batches need lanes
 
-            found = self.kept.setdefault("batch", Batch([self]))
-        return found
+            batch = self.kept.setdefault("batch", Batch([self]))
+        return batch
 
     @kept
     def state_names(self) -> tuple[labels.Names, labels.Names]:
@@ -411,9 +411,7 @@ class System(Mechanics):
             loads, w = self.inverse_at(t, y, rates)[1], self.own_workspace
         return referred(self, w, self.by_hinge(finite_result(loads, t)), axes, about)
 
-    def total_load(
-        self, state: State, joints: Sequence[str], on: str, *, about: tuple[str, str] | None = None
-    ) -> Real:
+    def total_load(self, state: State, joints: Sequence[str], on: str, *, about: tuple[str, str] | None = None) -> Real:
         """Sum (6,) [torque; force] of the loads that some hinges and closures exert on a body, World axes.
 
         NaN only where the motion leaves the sum itself open: how two parallel pins share a force follows from
@@ -458,9 +456,9 @@ class System(Mechanics):
         t, y = self.layout.entering(state)
         if self.constraints is not None:
             return self.constraints.all_loads(t, y)
-        found = self._evaluate(t, y, "articulated")
-        self.inverse_at(t, y, found.accelerations)
-        return AllLoads(t, found, self.own_workspace)
+        evaluation = self._evaluate(t, y, "articulated")
+        self.inverse_at(t, y, evaluation.accelerations)
+        return AllLoads(t, evaluation, self.own_workspace)
 
     def mass_properties(self, state: State, body: str | None = None) -> MassProperties:
         """Mass, mass centre and inertia of a body with all that it carries, or of the whole scene, at a state.

@@ -186,10 +186,10 @@ def said(seen: WatchedStates) -> list[Said]:
         return []
     skipped = seen.failed or not len(system.constants.section)
     return [
-        Said(each, watch.waiver)
+        Said(finding, watch.waiver)
         for watch in WATCHES
         if watch.waiver not in system.scene.allow and not (watch.strains and skipped)
-        for each in watch.look(seen)
+        for finding in watch.look(seen)
     ]
 
 
@@ -204,11 +204,11 @@ def of_states(system: System, states: Sequence[State], turns: Callable[[int], Re
 
 def _loads(system: System, states: Sequence[State]) -> dict[str, Real]:
     """Loads (T,6) of hinges and closures, by name."""
-    found = [system.evaluate(state.t, state.q, state.u).loads for state in states]
-    return {name: np.array([each[name] for each in found]) for name in (found[0] if found else ())}
+    loads = [system.evaluate(state.t, state.q, state.u).loads for state in states]
+    return {name: np.array([arrays[name] for arrays in loads]) for name in (loads[0] if loads else ())}
 
 
 def warn(seen: WatchedStates, stacklevel: int = 3) -> None:
     """A SceneWarning for each finding, for the caller of the calling function."""
-    for each in said(seen):
-        warnings.warn(f'scene "{seen.system.scene.name}": {each}', SceneWarning, stacklevel=stacklevel)
+    for finding in said(seen):
+        warnings.warn(f'scene "{seen.system.scene.name}": {finding}', SceneWarning, stacklevel=stacklevel)

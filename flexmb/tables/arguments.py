@@ -26,14 +26,14 @@ def array(name: str, values: Any) -> Vector:
         return values
     _refuse_masked(name, values)
     try:
-        found = np.asarray(values)
+        array = np.asarray(values)
     except ValueError:
         raise ValueError(f"{name}: rows of different lengths; give an array of numbers") from None
-    if found.size == 0 and not isinstance(values, np.ndarray):
-        found = found.astype(float)  # an empty list has no type
-    if found.dtype.kind not in "iuf":
-        raise TypeError(f"{name}: real numbers are needed, not {_kind(values, found)}")
-    return np.array(found, float, order="C")
+    if array.size == 0 and not isinstance(values, np.ndarray):
+        array = array.astype(float)  # an empty list has no type
+    if array.dtype.kind not in "iuf":
+        raise TypeError(f"{name}: real numbers are needed, not {_kind(values, array)}")
+    return np.array(array, float, order="C")
 
 
 def shaped(name: str, values: Any, shape: tuple[int, ...]) -> Vector:
@@ -110,26 +110,26 @@ def whole(name: str, value: Any) -> int:
 
 def count(name: str, value: Any) -> int:
     """The value as an integer of at least 1; TypeError or ValueError."""
-    found = whole(name, value)
-    if found < 1:
-        raise ValueError(f"{name} is {found}: at least 1 is needed")
-    return found
+    number = whole(name, value)
+    if number < 1:
+        raise ValueError(f"{name} is {number}: at least 1 is needed")
+    return number
 
 
 def position(name: str, value: Any, length: int) -> int:
     """A place in a sequence, negative if counted from its end; TypeError, or IndexError where there is none."""
-    found = whole(name, value)
-    if not -length <= found < length:
-        raise IndexError(f"{name} is {found}: there are {length}")
-    return found
+    number = whole(name, value)
+    if not -length <= number < length:
+        raise IndexError(f"{name} is {number}: there are {length}")
+    return number
 
 
 def index(name: str, value: Any, length: int) -> int:
     """An index from 0 to `length` - 1; TypeError or ValueError."""
-    found = whole(name, value)
-    if not 0 <= found < length:
-        raise ValueError(f"{name} is {found}: there are {length}, counted from 0")
-    return found
+    number = whole(name, value)
+    if not 0 <= number < length:
+        raise ValueError(f"{name} is {number}: there are {length}, counted from 0")
+    return number
 
 
 def one_of(name: str, value: Any, known: Iterable[str]) -> str:
@@ -148,9 +148,9 @@ def _refuse_masked(name: str, values: Any, place: tuple[int, ...] = ()) -> None:
             where = ", ".join(map(str, (*place, *masked)))
             raise ValueError(f"{name}[{where}] is masked: give a number in its place, as values.filled(0.0) does")
     elif isinstance(values, list | tuple) and len(place) < _DEEPEST:
-        for i, each in enumerate(values):
-            if not isinstance(each, float | int):
-                _refuse_masked(name, each, (*place, i))
+        for i, value in enumerate(values):
+            if not isinstance(value, float | int):
+                _refuse_masked(name, value, (*place, i))
 
 
 def _kind(values: Any, found: NDArray[Any]) -> str:

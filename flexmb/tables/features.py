@@ -107,17 +107,17 @@ def asking(kernels: Choice | None) -> Iterator[None]:
 
 def asked() -> Choice:
     """The choice of this thread, or of the environment; ValueError for an unknown value of FLEXMB_KERNELS."""
-    found = _ASKED.get() or os.environ.get(_VARIABLE, "auto")
-    match found:
+    kind = _ASKED.get() or os.environ.get(_VARIABLE, "auto")
+    match kind:
         case "auto" | "general" | "special":
-            return found
+            return kind
         case "beside" if _ASKED.get():
-            return found
+            return kind
         case "exact":  # the former name
             return "special"
         case _:
             names = ", ".join(f'"{name}"' for name in get_args(Kernels))
-            raise ValueError(f"{_VARIABLE} is {found!r}: use one of {names}; auto is meant if it is not set")
+            raise ValueError(f"{_VARIABLE} is {kind!r}: use one of {names}; auto is meant if it is not set")
 
 
 def as_asked() -> Index:
@@ -157,7 +157,7 @@ def fastest_at_hand(c: SceneTables, what: str) -> int:
 def contained(c: SceneTables) -> frozenset[str]:
     """The features of a scene, from its tables."""
     body, speed = c.body, c.speed
-    found = {
+    features = {
         SEVERAL: not np.all(_single(body, speed)),
         QUATERNIONS: np.any(body["quaternion"] >= 0),
         INBOARD_NODES: np.any(body["inboard_port"] >= 0),
@@ -191,11 +191,11 @@ def contained(c: SceneTables) -> frozenset[str]:
     numbered |= {f"{LEVEL} {n}" for n in set(body["level"].tolist())}
     numbered |= {f"{FRAME_LAW} {n}" for n in set(c.connector["kind"].tolist())}
     numbered |= {f"{LAW} {n}" for n in set(c.coordinate_law["kind"].tolist())}
-    return frozenset(name for name, there in found.items() if there) | numbered
+    return frozenset(name for name, there in features.items() if there) | numbered
 
 
 def _single(body: Record, speed: Record) -> Flags:
     """(N,) Whether a hinge has one speed, free, along z, and O is the body frame."""
-    found = (body["axis"] >= 0) & (body["outboard_port"] < 0)
-    found[found] = speed["prescribed"][body["u_index"][found]] < 0
-    return found
+    is_single = (body["axis"] >= 0) & (body["outboard_port"] < 0)
+    is_single[is_single] = speed["prescribed"][body["u_index"][is_single]] < 0
+    return is_single

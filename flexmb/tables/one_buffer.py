@@ -23,13 +23,13 @@ _APART = 8  # floats: every array starts at a multiple of this, as strips, lanes
 def in_one_buffer(tables: Bundle) -> tuple[Bundle, Real]:
     """A bundle with the same arrays, as parts of one buffer (n,), which is returned with it."""
     arrays = [getattr(tables, field.name) for field in fields(tables)]  # type: ignore[arg-type]
-    starts = np.cumsum([0, *[-(-each.nbytes // (8 * _APART)) * _APART for each in arrays]])
+    starts = np.cumsum([0, *[-(-array.nbytes // (8 * _APART)) * _APART for array in arrays]])
     buffer = wide_zeros((int(starts[-1]) // _APART,)).ravel()
     parts = list[Any]()
-    for start, each in zip(starts, arrays, strict=False):
-        part = buffer[start : start + -(-each.nbytes // 8)].view(np.uint8)[: each.nbytes]
-        parts.append(part.view(each.dtype).reshape(each.shape))
-        parts[-1][...] = each
+    for start, array in zip(starts, arrays, strict=False):
+        part = buffer[start : start + -(-array.nbytes // 8)].view(np.uint8)[: array.nbytes]
+        parts.append(part.view(array.dtype).reshape(array.shape))
+        parts[-1][...] = array
     return type(tables)(*parts), buffer
 
 
@@ -41,9 +41,9 @@ def places(tables: Any, buffer: Real, of: Any) -> Index:
     kept = buffer.copy()
     buffer[:] = np.arange(len(buffer))  # read through the arrays, every number says where it lies
     found = np.concatenate([
-        each.ravel()
+        array.ravel()
         for field in fields(of)
-        for each in _floats(getattr(tables, field.name), getattr(of, field.name))
+        for array in _floats(getattr(tables, field.name), getattr(of, field.name))
     ]).astype(np.int64)  # fmt: skip
     buffer[:] = kept
     return found

@@ -50,6 +50,6 @@ class per_thread(Generic[Value]):  # noqa: N801  (used as `property` is)
         except AttributeError:
             pass
         own: Own = instance.__dict__.setdefault("own", Own())  # atomic: two threads at once get the same object
-        found = self._find(instance)
-        setattr(own, self._name, found)
-        return found
+        value = self._find(instance)
+        setattr(own, self._name, value)
+        return value

@@ -122,10 +122,10 @@ class Layout:
 
     def known(self, t: float, y: Real) -> State:
         """A state from an array that is known to fit, without checks."""
-        found = object.__new__(State)
-        found.__dict__["layout"] = self
-        found._keep(y, self.nq, t)
-        return found
+        state = object.__new__(State)
+        state.__dict__["layout"] = self
+        state._keep(y, self.nq, t)
+        return state
 
     def fitting(self, nq: int, nu: int) -> None:
         """ValueError unless the lengths are those of this layout."""

@@ -67,7 +67,7 @@ class Row:
             why = a.refusal.partition(": ")[2] or a.refusal  # without the tolerance, which the row has
             yield from (f"refused: {why}", *[""] * 7, f"{self.seconds:.0f}")
             return
-        models = "; ".join(f"{each.body}: {each.rung}" for each in a.bodies) or "rigid as it is"
+        models = "; ".join(f"{body.body}: {body.rung}" for body in a.bodies) or "rigid as it is"
         yield from (models, str(a.method), f"{a.predicted:.1e}", f"{a.measured:.1e}", f"{self.true_error:.1e}")
         yield from (f"{a.predicted_operations:.1e}", f"{a.operations:.1e}")
         over = f"{a.operations / self.cheapest:.2f} of {self.tried}" if self.tried else "not searched"
@@ -176,7 +176,7 @@ def exhaustive(scene: Scene, advice: Advice) -> tuple[float, int]:
     """Operations of the cheapest run within the tolerance, and how many models were tried."""
     asked = prepare(scene, advice.tolerance, advice.quantities, advice.t_end)
     confirmation = asked.confirmation()
-    chosen = tuple((each.body, each.rung) for each in advice.bodies)
+    chosen = tuple((body.body, body.rung) for body in advice.bodies)
     least, tried = advice.operations, 0
     for model in choices(asked.ladders, chosen):
         least, tried = cheapest_run(confirmation, model, least), tried + 1
@@ -217,7 +217,7 @@ def choices(steps_of: dict[str, tuple[Step, ...]], chosen: Model) -> Iterator[Mo
             yield ()
         return
     rungs = {name: [step.rung for step in steps] for name, steps in steps_of.items()}
-    simple = {name: list(filter(plain, each)) for name, each in rungs.items()}
+    simple = {name: list(filter(plain, rung)) for name, rung in rungs.items()}
     alike = set.intersection(*map(set, rungs.values()))
     seen = dict.fromkeys(tuple((name, rung) for name in steps_of) for rung in sorted(alike, key=str))
     for number, allowed in ((1, rungs), (2, simple)):

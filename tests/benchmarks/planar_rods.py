@@ -86,8 +86,8 @@ class Rods:
         """Places (T,N,2), angles of hubs (T,C) and forces (T,N,2) on the masses at equidistant times, from rest."""
         places, masses, C = np.array(self.places), np.array(self.masses), len(self.corners)
         ends, sizes = np.array([link[:2] for link in self.links]), np.array([link[2:] for link in self.links])
-        kinds = np.array([2 if each.inertia else 1 if each.given else 0 for each in self.corners])
-        members = [(i, *each) for i, corner in enumerate(self.corners) for each in corner.members]
+        kinds = np.array([2 if corner.inertia else 1 if corner.given else 0 for corner in self.corners])
+        members = [(i, *member) for i, corner in enumerate(self.corners) for member in corner.members]
         table = np.array(members, dtype=float).reshape(-1, 4)
         first = np.searchsorted(table[:, 0], np.arange(C + 1))
         each = ceil(float(times[1] - times[0]) * self._highest() / STEP)

@@ -93,7 +93,7 @@ def _driven(scene: Scene) -> Iterator[str]:
     for item in (*scene.hinges, *scene.wheels, *scene.point_masses):
         motions = [getattr(freedom, "coordinate", None) for freedom in item.freedoms]
         held_there = item.name in latched
-        if held_there or any(getattr(each, "prescribed", None) is not None for each in motions):
+        if held_there or any(getattr(motion, "prescribed", None) is not None for motion in motions):
             yield item.name
 
 

@@ -142,7 +142,7 @@ def test_a_bend_of_varying_curvature_is_where_spectral_elements_are() -> None:
         curvatures = 2.0 * square / np.hypot(1.0, slope + 2.0 * square * np.array(along)) ** 3
         scene = scenes.bend_45(6, 5, points=16, curvatures=dict(zip(places, curvatures, strict=True)))
         (bend,) = scene.bodies
-        cut = tuple(replace(each, **bending, **shear) for each in bend.stations)
+        cut = tuple(replace(station, **bending, **shear) for station in bend.stations)
         scene = replace(scene, bodies=(replace(bend, stations=cut),))
         straight, lifted = (scenes.tip_at_rest(scene, *loads) for loads in ((0.0,), (150.0, 300.0, 450.0, 600.0)))
         c, s = np.cos(root_turn), np.sin(root_turn)

@@ -247,7 +247,7 @@ def slope_in_motion(case: str, level: Level, eigenmodes: int) -> float:
         done = simulate(chain, motion.duration, motion.method, rtol=1e-6, atol=1e-8, samples=motion.times)
         found = np.array([done.markers[marker.name].position for marker in scene.markers])
         errors.append(np.linalg.norm(found - exact_in_motion(case), axis=2).max(axis=0))
-    coarse, fine = (np.sqrt(np.mean(each**2)) for each in errors)
+    coarse, fine = (np.sqrt(np.mean(error**2)) for error in errors)
     return float(np.log2(coarse / fine))
 
 

@@ -120,5 +120,5 @@ def measured(result: fm.Trajectory, channel: str) -> np.ndarray:
 def stiffer(scene: Scene, name: str, factor: float) -> Scene:
     (body,) = (body for body in scene.bodies if body.name == name)
     assert isinstance(body, BeamBody)
-    stations = tuple(replace(each, EIy_Nm2=factor * (each.EIy_Nm2 or 0.0)) for each in body.stations)
+    stations = tuple(replace(station, EIy_Nm2=factor * (station.EIy_Nm2 or 0.0)) for station in body.stations)
     return replace(scene, bodies=tuple(replace(body, stations=stations) if b is body else b for b in scene.bodies))

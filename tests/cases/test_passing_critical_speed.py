@@ -21,8 +21,8 @@ def slender(drive: Function, viscosity: float = 0.0) -> Scene:
     """The case's shaft at level exact, without shear, gravity and rotary inertia; the disk is `BESIDE` the axis."""
     scene = load_scene(CASE / "slender.toml")
     curvatures = StrainPolynomials(torsion=2, bending_y=5, bending_z=5)
-    bodies = tuple(bernoulli(each, curvatures, viscosity) if isinstance(each, BeamBody) else
-                   replace(each, com_m=(0.0, 0.0, BESIDE)) for each in scene.bodies)  # fmt: skip
+    bodies = tuple(bernoulli(body, curvatures, viscosity) if isinstance(body, BeamBody) else
+                   replace(body, com_m=(0.0, 0.0, BESIDE)) for body in scene.bodies)  # fmt: skip
     (hinge, *others) = scene.hinges
     assert isinstance(hinge, Revolute)
     hinge = replace(hinge, rotation=replace(hinge.rotation, prescribed_rad=drive))
@@ -30,7 +30,7 @@ def slender(drive: Function, viscosity: float = 0.0) -> Scene:
 
 
 def bernoulli(half: BeamBody, curvatures: StrainPolynomials, viscosity: float) -> BeamBody:
-    stations = tuple(replace(each, rotary_y_kg_m=LITTLE, rotary_z_kg_m=LITTLE) for each in half.stations)
+    stations = tuple(replace(station, rotary_y_kg_m=LITTLE, rotary_z_kg_m=LITTLE) for station in half.stations)
     modes = fm.Modes(count=0, polynomials=curvatures, viscosity_s=viscosity)
     return replace(half, level="exact", stations=stations, modes=modes)
 

@@ -65,7 +65,9 @@ def test_the_advised_efforts_do(run, tmp_path: Path) -> None:
     code, output = run("sloppy", "--efforts", option)
     assert code == 0, output
     records = [json.loads(line) for line in (tmp_path / "out" / "records.jsonl").read_text().splitlines()]
-    ladder = {each["effort_value"] for each in records if each.get("engine") == "sloppy" and each["role"] == "main"}
+    ladder = {
+        record["effort_value"] for record in records if record.get("engine") == "sloppy" and record["role"] == "main"
+    }
     assert {float(value) for value in option.partition("=")[2].split(",")} < ladder
     assert run("sloppy")[0] == 1, "the shorter ladder counts again, though the longer one is recorded"
 
@@ -124,7 +126,7 @@ def test_a_session_that_shows_nothing_is_no_baseline(run, tmp_path: Path) -> Non
 
 def test_a_claim_that_names_nothing_fails_whatever_was_before(run) -> None:
     assert run("fine", "--baseline", "kept")[0] == 0
-    text = EXPECT.replace("sloppy", "fine").replace('"*" = 0.5', 'wheel_load = 0.5')
+    text = EXPECT.replace("sloppy", "fine").replace('"*" = 0.5', "wheel_load = 0.5")
     Path("crosscheck-expect.toml").write_text(text.replace("pendulum/*", "pendulum/single"), encoding="utf-8")
     code, output = run("fine", "--baseline", "kept")
     assert code == 1 and '"wheel_load" names no channel of fine' in output

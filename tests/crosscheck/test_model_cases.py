@@ -37,8 +37,10 @@ def test_a_robot_becomes_a_case_with_markers_at_the_bodies_that_move(tmp_path):
 
 
 def test_a_scene_keeps_its_markers_and_files_lie_where_they_lay(tmp_path):
-    rod = fm.SceneBuilder("swing").rigid_body("rod", mass=1.0, inertia=(0.1, 0.1, 0.1)).rigid_body(
-        "bob", mass=1.0, inertia=(0.1, 0.1, 0.1)
+    rod = (
+        fm.SceneBuilder("swing")
+        .rigid_body("rod", mass=1.0, inertia=(0.1, 0.1, 0.1))
+        .rigid_body("bob", mass=1.0, inertia=(0.1, 0.1, 0.1))
     )
     rod.revolute("j", "ground", "rod").weld("w", "rod", "bob")
     rod.marker("bob", "rod").marker("far", "bob", offset=(1, 0, 0))
@@ -99,6 +101,6 @@ def test_a_robot_is_judged_by_the_codes_that_are_installed(tmp_path):
     assert result.exit_code in (0, 1), result.output
     verdicts = json.loads((tmp_path / "o" / "verdicts.json").read_text())
     others = {"pinocchio", "mujoco"}
-    judged = [each for each in verdicts if each["engine_a"] == "native" and each["engine_b"] in others]
+    judged = [verdict for verdict in verdicts if verdict["engine_a"] == "native" and verdict["engine_b"] in others]
     assert {each["engine_b"] for each in judged} == others
     assert {each["status"] for each in judged} == {"agree"}

@@ -63,8 +63,8 @@ def flat(text: str) -> str:
 
 def shown(*renderables: object) -> str:
     console = Console(file=io.StringIO(), width=10_000, force_terminal=False)
-    for each in renderables:
-        console.print(each)
+    for renderable in renderables:
+        console.print(renderable)
     return console.file.getvalue()
 
 

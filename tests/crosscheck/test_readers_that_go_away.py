@@ -44,7 +44,7 @@ def line_of(command: str, files: dict[str, str]) -> str:
 
 
 @pytest.mark.parametrize(
-    "command", [pytest.param(each, marks=pytest.mark.slow if each in ALIKE else []) for each in COMMANDS]
+    "command", [pytest.param(command, marks=pytest.mark.slow if command in ALIKE else []) for command in COMMANDS]
 )
 def test_nobody_reads_at_all(command: str, files: dict[str, str]) -> None:
     """Both streams are closed before the first word: the exit code is that of the command, and nothing complains."""

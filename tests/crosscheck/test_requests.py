@@ -100,7 +100,7 @@ def test_every_command_that_takes_names_is_tried() -> None:
     tried = {words[0] for words in UNKNOWN}
     assert set(group.commands) == tried | WITHOUT_NAMES
     for name, command in group.commands.items():
-        options = {each for parameter in command.params for each in parameter.opts}
+        options = {option for parameter in command.params for option in parameter.opts}
         for option in {"--engine", "--variant", "--goal", "--efforts", "--clause"} & options:
             short = "-e" if option == "--engine" and name != "verify" else option
             assert any(words[0] == name and words[-1] == short for words in UNKNOWN), (name, option)

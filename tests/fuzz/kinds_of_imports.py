@@ -61,7 +61,7 @@ def of_imports(folder: Path) -> dict[str, Kind]:
         (folder / f"{stem}.dof").write_text(made_matrices.dof(len(K)))
     (folder / "d.sti").write_text(made_matrices.calculix(K))
     written("ansys", folder)
-    at = [each.split(",") for each in NODES.splitlines()[1:]]
+    at = [line.split(",") for line in NODES.splitlines()[1:]]
     inp = "*NODE, NSET=ALL\n" + "".join(f"{', '.join(words)}\n" for words in at) + "*STEP\n"
     grids = "".join(f"GRID,{i},,{x},{y},{z}\n" for i, x, y, z in at)
     return {

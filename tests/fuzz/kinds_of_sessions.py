@@ -74,7 +74,7 @@ def of_sessions(folder: Path) -> dict[str, Kind]:
 
 
 def _sweeps() -> tuple[bytes, ...]:
-    found = [f"{SWEEP}\n[[parameter]]\n{each}{QUANTITIES}".encode() for each in PARAMETERS]
+    found = [f"{SWEEP}\n[[parameter]]\n{parameter}{QUANTITIES}".encode() for parameter in PARAMETERS]
     grid = f"{SWEEP}\n[[parameter]]\n{PARAMETERS[-1]}{QUANTITIES}".replace("number = 6", 'sampling = "grid"')
     return (*found, grid.encode(), found[0].replace(b"seed = 3", b'sampling = "latin_hypercube"'))
 
@@ -124,11 +124,11 @@ def _says(content: dict[str, object], found: object) -> bool:
 def _sweep(path: Path) -> str | None:
     done = run_sweep(path, path.parent / "out", fresh=True, provider=PROVIDER, scheduler=lambda *_: (_ for _ in ()))
     sweep = done.sweep
-    if not done.records or not all(np.isfinite(list(each.parameters.values())).all() for each in done.records):
+    if not done.records or not all(np.isfinite(list(record.parameters.values())).all() for record in done.records):
         return "no samples, or values that are not finite"
     grid = 1
-    for each in sweep.parameters:
-        grid *= len(getattr(each, "values", ()))
+    for parameter in sweep.parameters:
+        grid *= len(getattr(parameter, "values", ()))
     count = grid if sweep.sampling == "grid" else sweep.number
     found = len(done.records)
     return None if found == count * len(sweep.engines) else f"{found} samples, and {count} were asked for"

@@ -34,7 +34,7 @@ BOTH = {"refused", "accepted"}
 def test_no_mutant_is_bad(tmp_path: Path, times: int) -> None:
     """A run on request: python -m tests.fuzz --mutants 50000."""
     results = campaign(times * MUTANTS, seed=1, workers=min(2, os.cpu_count() or 1), keep=tmp_path / "bad")
-    bad = [each for each in results if each["outcome"] in BAD]
+    bad = [result for result in results if result["outcome"] in BAD]
     assert not bad, f"\n{table(results)}\n" + "\n".join(f"{each['kind']} {each['number']}: {each}" for each in bad[:10])
     assert len(results) == times * MUTANTS
     for kind in {result["kind"] for result in results}:  # a kind whose mutants all come out alike is not tested
@@ -167,7 +167,7 @@ def _place(file: Path) -> str:
 
 
 def _writes(call: ast.Call) -> bool:
-    words = [each.value for each in call.args if isinstance(each, ast.Constant)]
+    words = [argument.value for argument in call.args if isinstance(argument, ast.Constant)]
     return any(isinstance(word, str) and word in ("w", "wb", "a", "ab") for word in words)
 
 
@@ -203,7 +203,7 @@ def test_every_reader_of_files_is_tried(kinds: tuple[Path, dict[str, subject.Kin
     reached = {(_place(Path(code.co_filename)), code.co_name) for code in codes.values()}
     readers = _readers()
     missing = [":".join(place) for place in sorted(readers - reached)]
-    idle = [place for place in NOT_OF_USERS if not any(":".join(each).startswith(place) for each in readers)]
+    idle = [place for place in NOT_OF_USERS if not any(":".join(reader).startswith(place) for reader in readers)]
     assert not idle, f"{idle} is said of no function that reads"
     missing = [place for place in missing if not place.startswith(tuple(NOT_OF_USERS))]
     assert not missing, f"no kind of file reaches {missing}: add a kind, or say why there is none"

@@ -85,7 +85,7 @@ def text() -> str:
     """The module."""
     helpers = [_function("angular", s.AngularCoordinate), _function("linear", s.LinearCoordinate)]
     methods = [textwrap.indent(_method(name, kind), "    ") for name, kind in METHODS.items()]
-    return "\n\n".join([HEAD, *(each + "\n" for each in helpers), CLASS + "\n".join(methods)])
+    return "\n\n".join([HEAD, *(helper + "\n" for helper in helpers), CLASS + "\n".join(methods)])
 
 
 def _function(name: str, kind: type[msgspec.Struct]) -> str:
@@ -171,7 +171,7 @@ def _wrapped(items: list[str], indent: str) -> list[str]:
 def _docstring(kind: type[msgspec.Struct], arguments: list[Argument]) -> list[str]:
     """The first paragraph of the struct's, with the units and ranges of the arguments."""
     first = cleandoc(kind.__doc__ or "").partition("\n\n")[0].replace("\n", " ")
-    said = ", ".join(each.said for each in arguments if each.said)
+    said = ", ".join(argument.said for argument in arguments if argument.said)
     if not said and len(first) < 100:
         return [f'    """{first}"""']
     lines = [*_paragraph(f'"""{first}'), *(["", *_paragraph(f"See {kind.__name__}: {said}.")] if said else [])]

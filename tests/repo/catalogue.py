@@ -1,6 +1,6 @@
 """docs/cases.md: every shipped case, who runs it, what anchors it, and how well its numbers are known. Write it with
 
-    python -m tests.repo.catalogue
+python -m tests.repo.catalogue
 """
 
 import re
@@ -63,7 +63,7 @@ def _known(case: Case) -> str:
     if not has_reference(case.folder):
         return "–"
     channels = load_reference(case.folder).knowledge.channels.values()
-    known = [each.uncertainty / each.scale for each in channels if each.scale > 0.0]
+    known = [channel.uncertainty / channel.scale for channel in channels if channel.scale > 0.0]
     return f"{min(known):.0e} to {max(known):.0e}" if known else "–"
 
 

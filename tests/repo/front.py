@@ -64,7 +64,7 @@ def kept(session: Session) -> Front:
 
 
 def _curve(engine: str, charts: Iterable[ChartOfCase]) -> Curve:
-    part = [each for each in charts if any(point.engine == engine for point in each.chart.points)]
+    part = [chart for chart in charts if any(point.engine == engine for point in chart.chart.points)]
     runs = [
         (_short(point.wall_s / each.unit_s), _short(max(point.error, each.chart.reference_uncertainty)))
         for each in part

@@ -55,8 +55,8 @@ def page() -> str:
     verdicts = {verdict.map: verdict for verdict in read_verdicts(PICTURES / VERDICTS)}
     maps = [_map(what, verdicts[name]) for name, what in stability_maps().items()]
     others = [
-        f"### {each.title}\n\n![{each.title}](pictures/{each.file})\n\n{each.text} `{each.command}`\n"
-        for each in other_pictures()
+        f"### {picture.title}\n\n![{picture.title}](pictures/{picture.file})\n\n{picture.text} `{picture.command}`\n"
+        for picture in other_pictures()
     ]
     return "\n".join([INTRODUCTION, *maps, "## Other pictures\n", *others])
 

@@ -33,7 +33,7 @@ def silent_places(source: str) -> Iterator[Place]:
         return
     for function, body in _functions(ast.parse(source)):
         nodes = list(_own(body))
-        chained = {id(each.orelse[0]) for each in nodes if isinstance(each, ast.If) and len(each.orelse) == 1}
+        chained = {id(node.orelse[0]) for node in nodes if isinstance(node, ast.If) and len(node.orelse) == 1}
         for node in nodes:
             match node:
                 case ast.Match():

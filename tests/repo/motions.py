@@ -49,20 +49,30 @@ class Motion(NamedTuple):
 
 MOTIONS = (
     Motion(
-        "satellite", "spacecraft/deploy_and_slew",
-        "A satellite unfolds two flexible panels, which latch, and turns by its three wheels.", 100.0,
+        "satellite",
+        "spacecraft/deploy_and_slew",
+        "A satellite unfolds two flexible panels, which latch, and turns by its three wheels.",
+        100.0,
     ),
     Motion(
-        "bricard", "closed_chains/bricard",
-        "Bricard's loop of six revolutes has one freedom, although counting gives none.", 10.0,
+        "bricard",
+        "closed_chains/bricard",
+        "Bricard's loop of six revolutes has one freedom, although counting gives none.",
+        10.0,
     ),
     Motion(
-        "andrews", "closed_chains/andrews", "Andrews's squeezer mechanism, a benchmark of solvers for closed chains.",
-        0.03, -90.0, 89.0,
+        "andrews",
+        "closed_chains/andrews",
+        "Andrews's squeezer mechanism, a benchmark of solvers for closed chains.",
+        0.03,
+        -90.0,
+        89.0,
     ),
     Motion("boom", "deploying_boom/flexible", "A boom of flexible members that is unfolded by motors.", 10.0),
     Motion(
-        "platform", "connectors/sprung_platform", "An instrument on a platform that stands on springs and dampers.",
+        "platform",
+        "connectors/sprung_platform",
+        "An instrument on a platform that stands on springs and dampers.",
         10.0,
     ),
     Motion("top", "tops/lagrange", "Lagrange's heavy top nods while it precesses.", 4.0),
@@ -178,9 +188,9 @@ def _line(points: Real) -> str:
 def page() -> str:
     """The text of docs/motions.md."""
     parts = [
-        f"## {each.case}\n\n![{each.text}](pictures/motions/{each.name}.svg)\n\n{each.text} "
-        f"{each.until_s:g} s in {SECONDS:g} s.\n"
-        for each in MOTIONS
+        f"## {motion.case}\n\n![{motion.text}](pictures/motions/{motion.name}.svg)\n\n{motion.text} "
+        f"{motion.until_s:g} s in {SECONDS:g} s.\n"
+        for motion in MOTIONS
     ]
     return "\n".join([INTRODUCTION, *parts])
 

@@ -39,7 +39,7 @@ def test_every_room_has_a_layer(package: str) -> None:
     ],
 )
 def test_a_wrong_list_of_rooms_is_noticed(wrong: str, fault: str) -> None:
-    assert any(each.startswith(fault) for each in a.faults_of_rooms(wrong, "crosscheck", ORDER))
+    assert any(room.startswith(fault) for room in a.faults_of_rooms(wrong, "crosscheck", ORDER))
 
 
 @pytest.mark.parametrize("page", ["docs/architecture.md", "docs/reading.md", "CONTRIBUTING.md", "README.md"])

@@ -20,7 +20,7 @@ def test_the_schema_is_the_present_one() -> None:
 
 
 def test_the_example_means_cases_of_the_library(tmp_path: Path) -> None:
-    (example,) = (each.code for each in snippets(PAGE) if each.language == "toml")
+    (example,) = (snippet.code for snippet in snippets(PAGE) if snippet.language == "toml")
     file = tmp_path / "crosscheck-expect.toml"
     file.write_text(example, encoding="utf-8")
     tags = {case.name: case.run.tags for case in shipped_cases()}
@@ -29,7 +29,7 @@ def test_the_example_means_cases_of_the_library(tmp_path: Path) -> None:
     )
     assert claims["pendulums/compound"].goals and claims["pendulums/double"].efforts
     assert not claims["wheel_gyrostat/torque_free"].failures
-    assert any(each.failures for each in claims.values())
+    assert any(claim.failures for claim in claims.values())
 
 
 def test_the_table_has_every_key() -> None:

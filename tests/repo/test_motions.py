@@ -24,7 +24,7 @@ def frames(picture: str) -> list[list[str]]:
 
 def test_the_page_is_what_the_generator_writes() -> None:
     assert motions.PAGE.read_text(encoding="utf-8") == motions.page(), "run `python -m tests.repo.motions`"
-    assert {file.stem for file in motions.PICTURES.iterdir()} == {each.name for each in motions.MOTIONS}
+    assert {file.stem for file in motions.PICTURES.iterdir()} == {motion.name for motion in motions.MOTIONS}
 
 
 @pytest.mark.parametrize("motion", motions.MOTIONS, ids=lambda each: each.name)

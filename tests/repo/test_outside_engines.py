@@ -90,7 +90,7 @@ def test_a_case_ends_as_the_page_says(name: str, words: str, installed: Path, tm
 def test_bullet_is_green_by_the_goal_of_its_page(installed: Path, tmp_path: Path) -> None:
     needs("bullet")
     (tmp_path / "cases").symlink_to(ROOT / "cases")
-    (goal,) = (each.code for each in snippets(PAGES["bullet"]) if each.language == "toml")
+    (goal,) = (snippet.code for snippet in snippets(PAGES["bullet"]) if snippet.language == "toml")
     (tmp_path / "crosscheck-expect.toml").write_text(goal, encoding="utf-8")
     run = crosscheck(installed, tmp_path, "run", CASE, "--engine", "bullet", "--alone")
     assert run.returncode == 0, run.stdout + run.stderr

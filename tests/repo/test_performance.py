@@ -62,7 +62,7 @@ def test_the_history_ends_with_what_is_kept_and_is_drawn() -> None:
     """A measurement that was kept and not appended would be lost with the next one."""
     points = history.read_history()
     last = {point.row: (point.date, point.commit, point.value) for point in points}
-    kept = {each.name: (each.date, each.commit, each.measured.value) for each in read().rows.values() if each.measured}
+    kept = {row.name: (row.date, row.commit, row.measured.value) for row in read().rows.values() if row.measured}
     assert {name: last.get(name) for name in kept} == kept, "run `python -m tests.benchmarks --from-kept --write`"
     assert history.PAGE.read_text(encoding="utf-8") == history.history_page(points)
     shown = re.findall(r"pictures/history/(.*?\.svg)", history.history_page(points))

@@ -47,7 +47,7 @@ def imported(nodes: Iterable[ast.AST]) -> Iterator[tuple[int, str]]:
         match node:
             case ast.ImportFrom(lineno=line, names=names, module=module):
                 modules = (module or "").split(".")
-                yield from ((line, name) for name in (*modules, *(each.name for each in names)) if is_private(name))
+                yield from ((line, name) for name in (*modules, *(name.name for name in names)) if is_private(name))
 
 
 def asked(nodes: Iterable[ast.AST]) -> Iterator[tuple[int, str]]:
@@ -65,12 +65,12 @@ def strangers(sources: Mapping[str, str]) -> list[str]:
         place: [node for node in ast.walk(ast.parse(source)) if isinstance(node, kinds)]
         for place, source in sources.items()
     }
-    defined = {place: set(filter(is_private, members(each))) for place, each in nodes.items()}
+    defined = {place: set(filter(is_private, members(node))) for place, node in nodes.items()}
     ours = set().union(*defined.values())
     return [
         f"{place}:{line}: {name}"
-        for place, each in nodes.items()
-        for line, name in (*imported(each), *((at, name) for at, name in asked(each) if name in ours - defined[place]))
+        for place, node in nodes.items()
+        for line, name in (*imported(node), *((at, name) for at, name in asked(node) if name in ours - defined[place]))
     ]
 
 
@@ -106,7 +106,7 @@ def long_signatures(source: str) -> Iterator[str]:
 
 def commands() -> set[tuple[str, str]]:
     """(file, function) of every command of the command lines."""
-    found = [each.callback for app in (flexmb.cli.app, crosscheck.cli.app) for each in app.registered_commands]
+    found = [command.callback for app in (flexmb.cli.app, crosscheck.cli.app) for command in app.registered_commands]
     return {(f"{each.__module__.replace('.', '/')}.py", each.__name__) for each in found if each is not None}
 
 

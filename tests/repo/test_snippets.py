@@ -18,7 +18,7 @@ from tests.repo.snippets import PAGES, Snippet, snippets
 RUN = ("python", "sh")
 COMMANDS = {"crosscheck": get_command(crosscheck.cli.app), "flexmb": get_command(flexmb.cli.app)}
 MOST_S = 120.0
-WITH_CODE = [page for page in PAGES if any(each.language in RUN and not each.why for each in snippets(page))]
+WITH_CODE = [page for page in PAGES if any(snippet.language in RUN and not snippet.why for snippet in snippets(page))]
 
 
 @pytest.mark.filterwarnings("error:.*more than its points can follow")  # an example would teach it
@@ -28,12 +28,12 @@ def test_the_page_runs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPat
     (tmp_path / "cases").symlink_to(ROOT / "cases")
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {"__name__": "__main__"}
-    for each in snippets(page):
-        if each.language == "python" and not each.why:
-            blank = "\n" * (each.line - 1)  # so that a traceback shows the line of the page
-            exec(compile(blank + each.code, str(page), "exec"), names)
-        elif each.language == "sh" and not each.why:
-            _in_shell(each)
+    for snippet in snippets(page):
+        if snippet.language == "python" and not snippet.why:
+            blank = "\n" * (snippet.line - 1)  # so that a traceback shows the line of the page
+            exec(compile(blank + snippet.code, str(page), "exec"), names)
+        elif snippet.language == "sh" and not snippet.why:
+            _in_shell(snippet)
 
 
 def _in_shell(snippet: Snippet) -> None:
@@ -47,11 +47,11 @@ def _in_shell(snippet: Snippet) -> None:
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_commands_and_options_exist(page: Path) -> None:
     """Of all blocks, those that are not run above all."""
-    for each in snippets(page):
-        if each.language == "sh":
-            for line in each.code.replace("\\\n", " ").splitlines():
+    for snippet in snippets(page):
+        if snippet.language == "sh":
+            for line in snippet.code.replace("\\\n", " ").splitlines():
                 if line.startswith(tuple(COMMANDS)):
-                    _check(each, shlex.split(line, comments=True))
+                    _check(snippet, shlex.split(line, comments=True))
 
 
 def _check(snippet: Snippet, words: list[str]) -> None:
@@ -59,7 +59,7 @@ def _check(snippet: Snippet, words: list[str]) -> None:
     commands = COMMANDS[program].commands  # type: ignore[attr-defined]
     assert len(words) < 2 or words[1].startswith("-") or words[1] in commands, f"{snippet.page}: {words}"
     if len(words) > 1 and words[1] in commands:
-        known = {"--help"}.union(*(each.opts + each.secondary_opts for each in commands[words[1]].params))
+        known = {"--help"}.union(*(param.opts + param.secondary_opts for param in commands[words[1]].params))
         asked = {word.partition("=")[0] for word in words[2:] if re.match(r"--?[a-z]", word)}
         assert asked <= known, f"{snippet.page}:{snippet.line}: {words[1]} has no {asked - known}"
 

@@ -68,7 +68,7 @@ def loaded(code: str, *words: str, folder: Path | None = None, **variables: str)
         [sys.executable, *(words or ("-c", code + TOLD))], cwd=folder, capture_output=True, text=True, timeout=120,
         env=os.environ | {"PYTHONPATH": path} | variables,
     )  # fmt: skip
-    (line,) = [each for each in done.stderr.splitlines() if each.startswith("loaded ")] or pytest.fail(
+    (line,) = [line for line in done.stderr.splitlines() if line.startswith("loaded ")] or pytest.fail(
         done.stdout + done.stderr
     )
     return set(json.loads(line.removeprefix("loaded ")))

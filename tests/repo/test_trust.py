@@ -43,7 +43,7 @@ def suspicious(source: str) -> Iterator[str]:
         if isinstance(node, ast.ImportFrom):
             modules += [f"{node.module}.{alias.name}" for alias in node.names]
         dotted = UNPICKLES | STARTS
-        yield from (each for each in modules if any(f"{each}.".startswith(f"{name}.") for name in dotted))
+        yield from (module for module in modules if any(f"{module}.".startswith(f"{name}.") for name in dotted))
 
 
 def test_code_is_run_where_the_page_says_and_nowhere_else() -> None:
@@ -55,7 +55,10 @@ def test_code_is_run_where_the_page_says_and_nowhere_else() -> None:
 @pytest.mark.parametrize(
     "line",
     [
-        "exec(text)", "import pickle", "from subprocess import run", "from urllib import request",
+        "exec(text)",
+        "import pickle",
+        "from subprocess import run",
+        "from urllib import request",
         "spec.loader.exec_module(m)",
     ],
 )

@@ -102,10 +102,19 @@ class CraftDynamics:
     def rate(self, t: float, y: Real) -> Real:
         """dy/dt."""
         state = self.state(t, y)
-        found = self.solve(t, state)
+        solved = self.solve(t, state)
         turning = quaternion_rate(y[3:7], state.turning)
         return np.concatenate(
-            [state.velocity, turning, found.linear, found.angular, found.spins, state.rates, found.parts, [found.power]]
+            [
+                state.velocity,
+                turning,
+                solved.linear,
+                solved.angular,
+                solved.spins,
+                state.rates,
+                solved.parts,
+                [solved.power],
+            ]
         )
 
     def _push(self, t: float, state: CraftState) -> float:

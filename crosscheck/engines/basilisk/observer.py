@@ -86,7 +86,7 @@ class BasiliskObserver:
         motions = {HUB: hub}
         for number, part in enumerate(self._dynamics.craft.parts):
             joint = motions[part.parent].at(part.inboard)
-            own = (float(each[number]) for each in (state.values, state.rates, found.parts))
+            own = (float(column[number]) for column in (state.values, state.rates, found.parts))
             motions[number] = joint.moved(part, *own)
         return motions
 

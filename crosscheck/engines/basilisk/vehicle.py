@@ -180,7 +180,7 @@ def _definite(inertia: Real) -> list[list[float]]:
 
 
 def _column(vector: Real) -> list[list[float]]:
-    return [[float(each)] for each in vector]
+    return [[float(number)] for number in vector]
 
 
 def _array(column: Any) -> Real:

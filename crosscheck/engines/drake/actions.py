@@ -34,9 +34,7 @@ class JointActions:
         self._springs = [slot for slot in single if slot.freedom.stiffness < 0.0]
         self._dampers = [slot for slot in single if slot.freedom.damping < 0.0]
         self._balls = [
-            (k, slot)
-            for k, slot in enumerate(tree.balls)
-            if slot.freedom.stiffness or slot.freedom.damping < 0.0
+            (k, slot) for k, slot in enumerate(tree.balls) if slot.freedom.stiffness or slot.freedom.damping < 0.0
         ]
         self._sprung = [slot for slot in single if slot.freedom.stiffness]
 
@@ -51,8 +49,8 @@ class JointActions:
         tau = np.zeros(self._nv)
         for index, motor in self._motors:
             tau[index] += motor(t).value
-        for speed, each in self.held(t, q, v).values():
-            tau[speed] += each.load
+        for speed, exerted in self.held(t, q, v).values():
+            tau[speed] += exerted.load
         for slot in self._springs:
             tau[slot.v] -= slot.freedom.stiffness * (q[slot.q] - slot.freedom.rest)
         for slot in self._dampers:
@@ -127,9 +125,7 @@ class DrakeLoads:
         return self._connectors.exerted(t, frame)
 
 
-def _applied(
-    t: float, poses: list[RigidTransform], body: BodyIndex, load: PointLoad
-) -> ExternallyAppliedSpatialForce:
+def _applied(t: float, poses: list[RigidTransform], body: BodyIndex, load: PointLoad) -> ExternallyAppliedSpatialForce:
     vector, nothing = load.in_world(t, poses[int(body)].rotation().matrix()), np.zeros(3)
     return _wrench(body, load.point, SpatialForce(*((nothing, vector) if load.is_force else (vector, nothing))))
 

@@ -71,7 +71,7 @@ class DrakeLinear:
         acceleration = self._accelerations(t, state)
         gradient = ExtractGradient(acceleration).reshape(n, -1)
         by_q, by_v, by_tau = gradient[:, :n], gradient[:, n : 2 * n], gradient[:, 2 * n :]
-        axes = OutboardAxes(state.v, np.array([each.value() for each in acceleration.ravel()]))
+        axes = OutboardAxes(state.v, np.array([component.value() for component in acceleration.ravel()]))
         for slot in (*self._balls, *self._flying):
             R, turning = self._rotation(slot, state), slice(slot.v, slot.v + 3)
             w = R.T @ state.v[turning]

@@ -150,7 +150,7 @@ def assemble(scene: Scene, kept: Mapping[str, Sequence[int]] = MappingProxyType(
     for mass in scene.point_masses:
         guides[mass.name], carrier = _point_mass(shop, placed[mass.body].at(mass.node), mass)
         carriers.append(carrier)
-    closures = {each.name: _closure(shop, placed, each, kept.get(each.name)) for each in scene.closures}
+    closures = {closure.name: _closure(shop, placed, closure, kept.get(closure.name)) for closure in scene.closures}
     for connector in scene.connectors:
         if isinstance(connector, BetweenNodes):
             _connect(shop, placed, connector)
@@ -172,7 +172,7 @@ def _held_nodes(scene: Scene) -> dict[str, set[str]]:
     bodies = {body.name: body for body in scene.bodies}
     users = [(hinge.parent, hinge.parent_node) for hinge in scene.hinges if hinge.parent != GROUND]
     users += [(item.body, item.node) for item in (*scene.wheels, *scene.point_masses)]
-    users += [(end.body, end.node) for each in scene.closures for end in ends(each) if end.body != GROUND]
+    users += [(end.body, end.node) for closure in scene.closures for end in ends(closure) if end.body != GROUND]
     for name, node in users:
         if deforming(bodies[name], node):
             held[name].add(node)
@@ -198,6 +198,7 @@ def _attach(
             return _hub(shop, found[0], hinge, hinge_motion, port.zero)
         found.append(_place(shop, scene, body, hinge, hinge_motion, zero, held))
         return found[0].carrier
+
     first = next(iter(hinge.freedoms), None)
     match first:
         case Floating():
@@ -216,7 +217,9 @@ def _attach(
 
 def _steps(item: Hinge | Wheel | PointMass) -> list[tuple[Real, joints.Coordinate]]:
     """(axis in the carried hinge frame, coordinate) of every freedom, from the inboard side."""
-    return [(_unit(each.axis), each.coordinate) for each in item.freedoms if isinstance(each, ScalarFreedom)]
+    return [
+        (_unit(freedom.axis), freedom.coordinate) for freedom in item.freedoms if isinstance(freedom, ScalarFreedom)
+    ]
 
 
 def _place(
@@ -314,13 +317,9 @@ def _section_marker(shop: Workshop, parent: Placed, node: str) -> int:
     )
 
 
-def _closure(
-    shop: Workshop, placed: dict[str, Placed], closure: Closure, kept: Sequence[int] | None
-) -> ExudynLink:
+def _closure(shop: Workshop, placed: dict[str, Placed], closure: Closure, kept: Sequence[int] | None) -> ExudynLink:
     """A joint between two frames that exist already."""
-    ports = [
-        _end(shop, placed, each.body, each.node, frame(each.position_m, each.quaternion)) for each in ends(closure)
-    ]
+    ports = [_end(shop, placed, end.body, end.node, frame(end.position_m, end.quaternion)) for end in ends(closure)]
     return joints.closure(shop, closure.name, closure.type, ports, _unit(closure.axis), kept)
 
 
@@ -348,7 +347,7 @@ def _connect(shop: Workshop, placed: dict[str, Placed], connector: BetweenNodes)
 def _connect_along(shop: Workshop, scene: Scene, kinds: Sequence[dict[str, ExudynLink]]) -> None:
     """Connect along hinges; connectors on a link's last coordinate contribute to the load on its outboard body."""
     for _, item, number, load in along_hinges(scene):
-        links = next(each for each in kinds if item in each)
+        links = next(kind for kind in kinds if item in kind)
         link = links[item]
         spring = springs.along(shop, link.stages[number], load)
         if number == len(link.stages) - 1:

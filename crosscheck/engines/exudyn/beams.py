@@ -130,7 +130,7 @@ def _clamp(
         )
     )
     shop.mbs.AddObject(shop.items.ObjectRigidBody2D(nodeNumber=hub, mass=0.0, inertia=0.0))
-    markers = [shop.mbs.AddMarker(shop.items.MarkerNodeRigid(nodeNumber=each)) for each in (hub, node)]
+    markers = [shop.mbs.AddMarker(shop.items.MarkerNodeRigid(nodeNumber=number)) for number in (hub, node)]
     shop.mbs.AddObject(shop.items.GenericJoint(markerNumbers=markers, constrainedAxes=[1, 1, 0, 0, 0, 1]))
     return _hold(shop, hub, hinge)
 
@@ -160,9 +160,7 @@ def _hold(
 
 def _constrain(shop: Workshop, node: int, coordinate: int, **motion: Callable) -> int:
     marker = shop.mbs.AddMarker(shop.items.MarkerNodeCoordinate(nodeNumber=node, coordinate=coordinate))
-    return shop.mbs.AddObject(
-        shop.items.CoordinateConstraint(markerNumbers=[shop.fixed_coordinate, marker], **motion)
-    )
+    return shop.mbs.AddObject(shop.items.CoordinateConstraint(markerNumbers=[shop.fixed_coordinate, marker], **motion))
 
 
 def _load(shop: Workshop, node: int, load: Load) -> None:

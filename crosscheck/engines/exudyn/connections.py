@@ -45,7 +45,7 @@ def _motion(path: CarrierPath, shape: NodeShape, offset: Real) -> tuple[Real, Re
     s = _times(J, theta_rate)  # angular velocity of the node in the body, body axes
     x = shape.position + path.eta @ shape.translation.T + arm
     x_rate = path.eta_rate @ shape.translation.T + np.cross(s, arm)
-    x_World, x_rate_World, s_World = (_times(A, each) for each in (x, x_rate, s))
+    x_World, x_rate_World, s_World = (_times(A, vector) for vector in (x, x_rate, s))
     position = path.position + x_World
     linear = path.velocity + np.cross(w, x_World) + x_rate_World
     velocity = np.concatenate([w + s_World, linear], axis=1)
@@ -91,7 +91,7 @@ def connected(assembly: Assembly, states: States, paths: Paths) -> Connected:
     for held in along.values():
         energy += [at.energy for at in held]
     return Connected(
-        {name: np.array([at.on_b for at in each]) for name, each in between.items()},
+        {name: np.array([at.on_b for at in motions]) for name, motions in between.items()},
         {name: np.array([[at.load] for at in held]) for name, held in along.items()},
         energy,
     )
@@ -112,7 +112,7 @@ def _along(assembly: Assembly, times: list[float], paths: Paths) -> dict[str, li
     for name, item, number, load in along_hinges(assembly.scene):
         stage = assembly.links[item].stages[number]
         motion = zip(times, coordinate(stage, paths).tolist(), coordinate_rate(stage, paths).tolist(), strict=True)
-        loads[name] = [load(*each) for each in motion]
+        loads[name] = [load(*moving) for moving in motion]
     return loads
 
 
@@ -124,4 +124,4 @@ def _moving(assembly: Assembly, end: EndFrame, paths: Paths, count: int) -> list
     path = marker_path(paths[placed.carrier.key], placed.shape(end.node), own.position)
     turns: Real = Rotation.from_quat(path.quaternion, scalar_first=True).as_matrix() @ own.rotation
     motion = zip(path.position, turns, path.velocity[:, :3], path.velocity[:, 3:], strict=True)
-    return [Moving(*each) for each in motion]
+    return [Moving(*state) for state in motion]

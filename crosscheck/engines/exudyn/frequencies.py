@@ -36,11 +36,11 @@ def frequencies(assembly: Assembly, states: States) -> LinearOutputs:
     """The frequencies (T,n) at all samples, and how well they are known; nothing unless all are equilibria."""
     solver = _Residual(assembly)
     try:
-        found = [solver.at(states, sample) for sample in range(len(states.times))]
+        samples = [solver.at(states, sample) for sample in range(len(states.times))]
     finally:
         solver.close()
-    known = [each for each in found if each is not None]
-    if len(known) < len(found) or not len(known[0].by_speed):
+    known = [frequency for frequency in samples if frequency is not None]
+    if len(known) < len(samples) or not len(known[0].by_speed):
         return NOTHING
     rows, doubts = map(np.array, zip(*map(eigenfrequencies, known), strict=True))
     return LinearOutputs({}, rows, {FREQUENCIES: doubts})

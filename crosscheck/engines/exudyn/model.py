@@ -44,8 +44,8 @@ class ExudynModel:
             drives={name: values[0] for name, values in drives(self.assembly, states).items()},
             energy={kind: float(values[0]) for kind, values in energy.items()},
             momentum=momentum[0],
-            connectors={name: each[0] for name, each in held.between.items()},
-            hinge_forces={name: each[0] for name, each in held.along.items()},
+            connectors={name: motions[0] for name, motions in held.between.items()},
+            hinge_forces={name: motions[0] for name, motions in held.along.items()},
         )
 
     def simulate(self, run: Run, effort: Effort) -> Trajectory:

@@ -21,7 +21,7 @@ def local_rate_map(p: Real) -> Real:
 
 def turn_and_rate_map(p: Real) -> tuple[Real, Real]:
     """Rotation matrix and `local_rate_map` of one set of Euler parameters (4,), quickly: for Exudyn's call-backs."""
-    p0, p1, p2, p3 = (float(each) for each in p)
+    p0, p1, p2, p3 = (float(parameter) for parameter in p)
     G = np.array([[-p1, p0, p3, -p2], [-p2, -p3, p0, p1], [-p3, p2, -p1, p0]])
     E = np.array([[-p1, p0, -p3, p2], [-p2, p3, p0, -p1], [-p3, -p2, p1, p0]])
     return E @ G.T, 2.0 * G
@@ -35,10 +35,10 @@ def matrices(p: Real) -> Real:
 
 def quaternions(R: Real) -> Real:
     """Quaternions wxyz (..., 4) of rotation matrices (..., 3, 3), with no sign jump from one sample to the next."""
-    found = scalar_first(Rotation.from_matrix(R.reshape(-1, 3, 3)).as_quat())
-    sign = np.where(np.einsum("ti,ti->t", found[1:], found[:-1]) < 0.0, -1.0, 1.0)
-    found[1:] *= np.cumprod(sign)[:, None]
-    return found.reshape(*R.shape[:-2], 4)
+    quaternion = scalar_first(Rotation.from_matrix(R.reshape(-1, 3, 3)).as_quat())
+    sign = np.where(np.einsum("ti,ti->t", quaternion[1:], quaternion[:-1]) < 0.0, -1.0, 1.0)
+    quaternion[1:] *= np.cumprod(sign)[:, None]
+    return quaternion.reshape(*R.shape[:-2], 4)
 
 
 def exponential(theta: Real) -> Real:

@@ -60,20 +60,20 @@ def spatial_beam(shop: Workshop, body: BeamBody, motion: FrameMotion) -> Spatial
     """The beam at rest in its own frame, which moves by `motion` at t = 0."""
     x = element_ends(body)
     position, rotation = rest_sections(body, x)
-    motions = [motion.offset(*each) for each in zip(position, rotation, strict=True)]
-    carriers = [shop.rigid(*each) for each in zip(motions, repeat(np.eye(3)), _lumps(body, x))]
+    motions = [motion.offset(*offset) for offset in zip(position, rotation, strict=True)]
+    carriers = [shop.rigid(*part) for part in zip(motions, repeat(np.eye(3)), _lumps(body, x))]
     turn = np.swapaxes(rotation[:-1], 1, 2) @ rotation[1:]
     apart = np.einsum("kji,kj->ki", rotation[:-1], np.diff(position, axis=0))
     stiffness = _stiffness(body, (x[1:] + x[:-1]) / 2.0)
     columns = carriers[:-1], carriers[1:], np.diff(x).tolist(), stiffness, logarithm(turn, apart)
-    elements = [BeamElement(*each) for each in zip(*columns, strict=True)]
+    elements = [BeamElement(*columns_of_element) for columns_of_element in zip(*columns, strict=True)]
     for element in elements:
         _add(shop, element)
-    found = {}
+    beams = {}
     for name, rest in rest_frames(body).items():
         k = int(np.argmin(np.abs(x - nodes_along(body)[name])))
-        found[name] = BeamSection(carriers[k], motions[k], rotation[k].T @ rotation_matrix(rest.quaternion))
-    return SpatialBeam(found, tuple(carriers), tuple(elements))
+        beams[name] = BeamSection(carriers[k], motions[k], rotation[k].T @ rotation_matrix(rest.quaternion))
+    return SpatialBeam(beams, tuple(carriers), tuple(elements))
 
 
 def _add(shop: Workshop, element: BeamElement) -> None:
@@ -108,4 +108,4 @@ def _lumps(body: BeamBody, x: Real) -> list[Inertia]:
     for lump in body.tip_masses:
         place = int(np.argmin(np.abs(x - lump.x_m)))
         parts[place].append(Inertia(lump.mass_kg, np.array(lump.com_m), np.array(lump.inertia_kg_m2)))
-    return [combine(each) for each in parts]
+    return [combine(part) for part in parts]

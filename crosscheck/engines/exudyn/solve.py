@@ -108,9 +108,9 @@ def _starts_accelerated(assembly: Assembly | PlanarBeam) -> bool:
 
 def _tell_accelerations(assembly: Assembly | PlanarBeam) -> None:
     """Set Exudyn's accelerations at t = 0."""
-    found = initial_state(assembly).a
-    assert found is not None
-    assembly.shop.mbs.systemData.SetODE2Coordinates_tt(found[0], assembly.shop.exu.ConfigurationType.Initial)
+    accelerations = initial_state(assembly).a
+    assert accelerations is not None
+    assembly.shop.mbs.systemData.SetODE2Coordinates_tt(accelerations[0], assembly.shop.exu.ConfigurationType.Initial)
 
 
 def _settings(assembly: Assembly | PlanarBeam):

@@ -70,17 +70,17 @@ def _line(shop: Workshop, connector: SpringDamper, ends: Sequence[ConnectorEnd])
 def _force(shop: Workshop, connector: BetweenNodes, ends: Sequence[ConnectorEnd]) -> None:
     law = exerts(connector)
     held = [_Held(shop, end) for end in ends]
-    sizes = {node: size for each in held for node, size in each.nodes.items()}
+    sizes = {node: size for side in held for node, size in side.nodes.items()}
     starts = np.cumsum([0, *sizes.values()])
     places = {node: slice(starts[i], starts[i + 1]) for i, node in enumerate(sizes)}
 
     def force(mbs, t, item, q, qdot):
         q, qdot, total = np.asarray(q), np.asarray(qdot), np.zeros(starts[-1])
-        for each in held:
-            each.take(*([values[places[node]] for node in each.nodes] for values in (q, qdot)))
-        found = law(t, *(each.motion for each in held))
-        for each, wrench in zip(held, (found.on_a, found.on_b), strict=True):
-            for node, share in zip(each.nodes, each.generalised(wrench), strict=True):
+        for side in held:
+            side.take(*([values[places[node]] for node in side.nodes] for values in (q, qdot)))
+        found = law(t, *(side.motion for side in held))
+        for side, wrench in zip(held, (found.on_a, found.on_b), strict=True):
+            for node, share in zip(side.nodes, side.generalised(wrench), strict=True):
                 total[places[node]] += share
         return total
 

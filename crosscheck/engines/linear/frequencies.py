@@ -28,8 +28,8 @@ def eigenfrequencies(at: LinearMatrices) -> tuple[Real, float]:
     """The frequencies (n,) and the Euclidean norm of their errors (rad/s), infinite where the masses are singular."""
     if not np.isfinite((at.errors.by_displacement, at.errors.by_speed)).all():
         return np.zeros(len(at.by_speed)), float("inf")
-    found = _undamped(at)
-    frequencies, errors = found if found is not None else _damped(at)
+    undamped = _undamped(at)
+    frequencies, errors = undamped if undamped is not None else _damped(at)
     frequencies = np.where(frequencies <= errors, 0.0, frequencies)
     order = np.argsort(frequencies, kind="stable")
     return frequencies[order], norm(errors)

@@ -39,17 +39,17 @@ def outputs(
 
     `samples` is not looked at if nothing was asked, nor if there are no coordinates.
     """
-    found = list(samples) if asked else []
-    if not found or not len(found[0].by_speed):
+    rows = list(samples) if asked else []
+    if not rows or not len(rows[0].by_speed):
         return NOTHING
     derivatives, known_to, frequencies = {}, {}, None
     if "derivatives" in asked:
-        derivatives = {name: np.array([getattr(at, name).ravel() for at in found]) for name in offered}
-        known_to = {name: np.array([getattr(at.errors, name) for at in found]) for name in offered}
+        derivatives = {name: np.array([getattr(at, name).ravel() for at in rows]) for name in offered}
+        known_to = {name: np.array([getattr(at.errors, name) for at in rows]) for name in offered}
     if "frequencies" in asked:
         from crosscheck.engines.linear.frequencies import eigenfrequencies  # loads SciPy
 
-        frequencies, doubts = map(np.array, zip(*(eigenfrequencies(at) for at in found), strict=True))
+        frequencies, doubts = map(np.array, zip(*(eigenfrequencies(at) for at in rows), strict=True))
         known_to[FREQUENCIES] = doubts
     return LinearOutputs(derivatives, frequencies, known_to)
 

@@ -37,7 +37,7 @@ class MujocoEngine(PeerEngine):
 
     def obstacle(self, scene: Scene) -> str:
         reason = obstacle(scene, "MuJoCo", ("spherical", "revolute", "weld"), KNOWN, couplings=True, armatures=True)
-        return reason or inertia_obstacle((each for each in links(scene) if not is_bare_frame(each)), "MuJoCo")
+        return reason or inertia_obstacle((link for link in links(scene) if not is_bare_frame(link)), "MuJoCo")
 
     def supports(self, scene: Scene) -> Support:
         support = super().supports(scene)

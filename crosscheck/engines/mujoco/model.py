@@ -41,7 +41,7 @@ _INTEGRATORS = {  # method of an effort: MuJoCo's constant, evaluations per step
 class MujocoModel:
     def __init__(self, scene: Scene) -> None:
         chain = links(scene)
-        closures = tuple(mujoco_closure(scene, chain, each) for each in scene.closures)
+        closures = tuple(mujoco_closure(scene, chain, closure) for closure in scene.closures)
         gravity = np.array(scene.gravity_m_s2, dtype=float)
         self._tree = build_tree(chain, gravity, closures, _couplings(scene, chain))
         self._forces = Forces(self._tree, scene)
@@ -111,16 +111,16 @@ class MujocoModel:
 
 def _couplings(scene: Scene, chain: tuple[Link, ...]) -> tuple[MujocoCoupling, ...]:
     """Couplings by the names of the joints that they relate."""
-    found = []
+    couplings = []
     for coupling in scene.couplings:
         related, joints = coupled(scene, coupling), []
-        for each in related:
-            link = next(link for link in chain if link.kind == "body" and link.joint == each.hinge.name)
+        for member in related:
+            link = next(link for link in chain if link.kind == "body" and link.joint == member.hinge.name)
             scalars = [k for k, freedom in enumerate(link.freedoms) if isinstance(freedom, Scalar)]
-            joints.append(joint_name(link, scalars[each.place]))
-        factors = tuple(each.factor for each in related)
-        found.append(MujocoCoupling(coupling.name, tuple(joints), factors, coupling.offset))
-    return tuple(found)
+            joints.append(joint_name(link, scalars[member.place]))
+        factors = tuple(member.factor for member in related)
+        couplings.append(MujocoCoupling(coupling.name, tuple(joints), factors, coupling.offset))
+    return tuple(couplings)
 
 
 def _is_bad(data: mujoco.MjData) -> bool:

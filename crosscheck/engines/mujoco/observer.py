@@ -133,7 +133,7 @@ class MujocoObserver:
 
     def _drives(self, data: mujoco.MjData, loads: dict[tuple[str, str], Real]) -> dict[str, Real]:
         """Load across the joint along the prescribed axis and on the armature, less what spring and damper give."""
-        found = []
+        drives = []
         for slot in self._forces.driven:
             load = loads[slot.link.kind, slot.link.joint]
             about_axis = shift_wrench(load, data.xpos[slot.body] - data.xanchor[slot.joint])
@@ -144,7 +144,7 @@ class MujocoObserver:
             passive += sum(held.load for v, held in along if v == slot.v)
             for coupling, size in zip(self._couplings, self._held(data).tolist(), strict=True):
                 own = zip(coupling.slots, coupling.factors, strict=True)
-                passive += sum(factor * size for each, factor in own if each.v == slot.v)
+                passive += sum(factor * size for member, factor in own if member.v == slot.v)
             rotor = freedom.armature * data.qacc[slot.v]
-            found.append(half @ data.xaxis[slot.joint] + rotor - passive)
-        return by_joint(self._forces.driven, found)
+            drives.append(half @ data.xaxis[slot.joint] + rotor - passive)
+        return by_joint(self._forces.driven, drives)

@@ -138,7 +138,9 @@ def build_tree(
         _close(spec, bodies, closed, i)
     for coupling in couplings:
         _couple(spec, coupling)
-    driven = any(isinstance(each, Scalar) and each.prescribed is not None for link in links for each in link.freedoms)
+    driven = any(
+        isinstance(freedom, Scalar) and freedom.prescribed is not None for link in links for freedom in link.freedoms
+    )
     if couplings or (closures and driven):  # its solver stops at errors relative to the mean inertia, armatures too
         spec.option.tolerance = 0.0
     model = spec.compile()

@@ -50,10 +50,10 @@ class PinocchioClosures:
 
     def solve(self, q: Real, v: Real, tau: Real) -> Real:
         """Accelerations (nv,) that keep the closures closed under generalised forces tau (nv,)."""
-        found = pin.constraintDynamics(
+        accelerations = pin.constraintDynamics(
             self._model, self._data, q, v, tau, self._constraints, self._found, self._settings
         )
-        return np.array(found)
+        return np.array(accelerations)
 
     def loads(self) -> dict[str, Real]:
         """[torque; force] (6,) on body_b about frame B, World axes, of the state solved last."""

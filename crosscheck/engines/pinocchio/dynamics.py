@@ -34,8 +34,7 @@ class PinocchioSolution(NamedTuple):
 
 
 class Acting(NamedTuple):
-    """Generalised forces (nv,), wrenches on joints and power (W) at time t (s) of all that acts but gravity and drives.
-    """
+    """Generalised forces (nv,), wrenches on joints and power (W) at t (s) of all that acts but gravity and drives."""
 
     t: float
     tau: Real
@@ -91,9 +90,9 @@ class Dynamics:
         if self.forces.loses:
             lost = self.forces.dampers_and_motors(t, state.v)
             tau, power = tau + lost, float(lost @ state.v)
-        for speed, each in self.connections.along(t, state.q, state.v).values():
-            tau[speed] += each.load
-            power += each.power
+        for speed, exerted in self.connections.along(t, state.q, state.v).values():
+            tau[speed] += exerted.load
+            power += exerted.power
         if not (self.loads or self.connections):
             return Acting(t, tau, None, power)
         wrenches, working = self._wrenches(t, state)

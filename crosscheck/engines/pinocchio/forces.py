@@ -94,7 +94,7 @@ class PinocchioConnections:
             back, arm = data.oMi[joint].rotation.T, at.frame.position
             force = back @ load[3:]
             total[joint] = total[joint] + pin.Force(force, back @ load[:3] + cross(arm, force))
-        return sum(each.power for each in exerted.values())
+        return sum(connector.power for connector in exerted.values())
 
     def along(self, t: float, q: Real, v: Real) -> dict[str, tuple[int, Along]]:
         """By name the speed that a connector along a hinge acts on, and what it does."""

@@ -98,15 +98,15 @@ class PinocchioLinear:
 
     def _drag(self, state: TreeState) -> Real:
         """d tau/d v (nv,nv) of dampers."""
-        found = np.zeros(self._model.nv)
+        forces = np.zeros(self._model.nv)
         for slot in self._dynamics.tree.slots:
             match slot.freedom:
                 case Scalar(damping=c):
-                    found[slot.v] -= c
+                    forces[slot.v] -= c
                 case Ball(damping=c):
-                    found[slot.v : slot.v + 3] -= c
+                    forces[slot.v : slot.v + 3] -= c
                 case Floating():
                     pass
                 case _:
                     assert_never(slot.freedom)
-        return np.diag(found)
+        return np.diag(forces)

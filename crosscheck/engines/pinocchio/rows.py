@@ -64,10 +64,10 @@ class PinocchioRows:
         """`driven`: speeds whose accelerations are given."""
         self._couplings, nv = placed_couplings(scene, tree.slots), tree.model.nv
         at = {slot.v: joint for joint, slot in enumerate(tree.slots, 1)}  # the joint of World comes first
-        self._led = [at[each.slots[0].v] for each in self._couplings]
+        self._led = [at[coupling.slots[0].v] for coupling in self._couplings]
         self._closures = {closure.name: (closure.type, _ends(tree, scene, closure)) for closure in closures}
         self._model, self._data = tree.model, tree.model.createData()
-        self._coupled = np.array([each.row(nv) for each in self._couplings]).reshape(-1, nv)
+        self._coupled = np.array([coupling.row(nv) for coupling in self._couplings]).reshape(-1, nv)
         self._free = np.setdiff1d(np.arange(nv), driven)
         self._load = np.zeros(len(self._couplings))
         self._wrench: dict[str, tuple[Real, Real]] = {}  # of closures: [torque; force] on B about B, and where B is
@@ -101,8 +101,8 @@ class PinocchioRows:
         """[torque; force] (6,) of the state solved last, World axes: of closures on body_b about B, of couplings along
         the axis of what they lead."""
         of_couplings = {
-            each.name: each.load(size, data.oMi[joint].rotation @ each.slots[0].freedom.axis)
-            for each, joint, size in zip(self._couplings, self._led, self._load.tolist(), strict=True)
+            coupling.name: coupling.load(size, data.oMi[joint].rotation @ coupling.slots[0].freedom.axis)
+            for coupling, joint, size in zip(self._couplings, self._led, self._load.tolist(), strict=True)
         }
         return of_couplings | {name: load for name, (load, _) in self._wrench.items()}
 
@@ -142,12 +142,12 @@ class PinocchioRows:
 
     def _reach(self, joint: int, point: Real) -> Real:
         """(6, nv) [angular; linear] velocity in World axes of the body at a joint, there where `point` is."""
-        found = np.zeros((6, self._model.nv))
+        rows = np.zeros((6, self._model.nv))
         if joint:
             J = pin.getJointJacobian(self._model, self._data, joint, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
             arm = point - self._data.oMi[joint].translation
-            found[:3], found[3:] = J[3:], J[:3] + cross(J[3:].T, arm).T
-        return found
+            rows[:3], rows[3:] = J[3:], J[:3] + cross(J[3:].T, arm).T
+        return rows
 
 
 def _ends(tree: PinocchioTree, scene: Scene, closure: Closure) -> tuple[_End, _End]:

@@ -44,8 +44,8 @@ def mjcf(scene: Scene, name: str) -> Written:
     freedoms = [freedom for link in chain for freedom in link.freedoms]
     if freedoms:
         key = ElementTree.SubElement(ElementTree.SubElement(root, "keyframe"), "key", name="start")
-        key.set("qpos", vector(np.concatenate([_start(each)[0] for each in freedoms])))
-        key.set("qvel", vector(np.concatenate([_start(each)[1] for each in freedoms])))
+        key.set("qpos", vector(np.concatenate([_start(freedom)[0] for freedom in freedoms])))
+        key.set("qvel", vector(np.concatenate([_start(freedom)[1] for freedom in freedoms])))
     ElementTree.indent(root)
     text = ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
     return Written(text, left_out=beside_the_tree(scene))

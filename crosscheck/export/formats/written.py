@@ -33,9 +33,9 @@ def chain_of(scene: Scene, program: str, screws: bool = False) -> tuple[tuple[Li
 
 def beside_the_tree(scene: Scene) -> tuple[str, ...]:
     """What acts on a tree and no format here holds: connectors, loads, motors, prescribed motions, feedback, events."""
-    found = [f"{kind} {item.name}" for kind, items in _parts(scene) for item in items]
-    found += [f"motor of {name}" for name, coordinate in _scalars(scene) if coordinate.effort is not None]
-    return (*found, *prescribed(scene))
+    names = [f"{kind} {item.name}" for kind, items in _parts(scene) for item in items]
+    names += [f"motor of {name}" for name, coordinate in _scalars(scene) if coordinate.effort is not None]
+    return (*names, *prescribed(scene))
 
 
 def prescribed(scene: Scene) -> tuple[str, ...]:
@@ -50,22 +50,22 @@ def prescribed(scene: Scene) -> tuple[str, ...]:
 def _scalars(scene: Scene) -> list[tuple[str, Coordinate]]:
     """Scalar coordinates with the names of their hinges, wheels and point masses."""
     moved = [*scene.hinges, *scene.wheels, *scene.point_masses]
-    return [(each.name, f.coordinate) for each in moved for f in each.freedoms if isinstance(f, ScalarFreedom)]
+    return [(hinge.name, f.coordinate) for hinge in moved for f in hinge.freedoms if isinstance(f, ScalarFreedom)]
 
 
 def springs(chain: tuple[Link, ...]) -> tuple[str, ...]:
     """Joints with a spring or a damper of their own."""
-    found = []
+    lines = []
     for link in chain:
         for freedom in link.freedoms:
             match freedom:
                 case Scalar(stiffness=stiffness, damping=damping) | Ball(stiffness=stiffness, damping=damping):
-                    found += [f"spring or damper of {link.joint}"] * bool(stiffness or damping)
+                    lines += [f"spring or damper of {link.joint}"] * bool(stiffness or damping)
                 case Floating():
                     pass
                 case _:
                     assert_never(freedom)
-    return tuple(dict.fromkeys(found))
+    return tuple(dict.fromkeys(lines))
 
 
 def _parts(scene: Scene) -> tuple[tuple[str, tuple[Any, ...]], ...]:

@@ -61,7 +61,11 @@ class RebuiltCase:
         nodes = {name: {"origin", *body.get("nodes", ())} for name, body in self.bodies.items()}
         nodes |= {name: set(modal["nodes"]) for name, modal in self.modal.items()} | {"ground": {"origin"}}
         places = [(joint[end], joint[f"{end}_node"]) for joint in joints for end in ("parent", "child")]
-        places += [(each["body"], each["node"]) for part in ("loads", "markers") for each in self.data[part]]
+        places += [
+            (item_of_case["body"], item_of_case["node"])
+            for part in ("loads", "markers")
+            for item_of_case in self.data[part]
+        ]
         for body, node in places:
             if node not in nodes.get(body, ()):
                 raise ValueError(f'there is no node "{node}" of a body "{body}"')
@@ -204,7 +208,7 @@ class RebuiltCase:
             at = frame.at(np.array(data["mass_centre_m"]), np.eye(3))
             inertia = frame.R @ np.array(data["inertia_kg_m2"]) @ frame.R.T
             one = (at.r, at.V, at.a, at.W, at.w, at.alpha, inertia)
-            return np.array([data["mass_kg"]]), *(each[None] for each in one)
+            return np.array([data["mass_kg"]]), *(quantity[None] for quantity in one)
         p, (qs, us) = self.modal[body]["points"], self.eta[body]
         rate = u[us]
         rho, Phi, bias, theta, Psi, turning = field(p, y[qs], rate)
@@ -305,16 +309,16 @@ class RebuiltCase:
         y, given = self.driven(t, y)
         M, f = self.equations(t, y)
         free = [j for j in range(self.nu) if j not in given]
-        found = np.zeros(self.nu)
+        solution = np.zeros(self.nu)
         for j, value in given.items():
-            found[j] = value
+            solution[j] = value
         if free:
-            known = f - M @ found
+            known = f - M @ solution
             try:
-                found[free] = np.linalg.solve(M[np.ix_(free, free)], known[free])
+                solution[free] = np.linalg.solve(M[np.ix_(free, free)], known[free])
             except np.linalg.LinAlgError:  # a trial step went far beyond what the modes mean: it will be a shorter one
-                found[:] = np.nan
-        return y, found, M @ found - f
+                solution[:] = np.nan
+        return y, solution, M @ solution - f
 
     def coordinate_rates(self, y):
         """dq/dt."""

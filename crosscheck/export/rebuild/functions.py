@@ -17,7 +17,9 @@ def function_of(data):
     if kind == "sine":
         A, w, phase, offset = (data[k] for k in ("amplitude", "angular_frequency_rad_s", "phase_rad", "offset"))
         return lambda t: (
-            offset + A * np.sin(w * t + phase), A * w * np.cos(w * t + phase), -A * w * w * np.sin(w * t + phase)
+            offset + A * np.sin(w * t + phase),
+            A * w * np.cos(w * t + phase),
+            -A * w * w * np.sin(w * t + phase),
         )
     if kind == "smooth_step":
         first, height = data["start_value"], data["end_value"] - data["start_value"]
@@ -36,9 +38,13 @@ def function_of(data):
         rate, T = data["rate"], data["duration_s"]
         c = 2.0 * np.pi / T
         return lambda t: (
-            (rate * (t - T / 2.0), rate, 0.0) if t >= T else
-            (rate / T * (t * t / 2.0 + (np.cos(c * t) - 1.0) / c**2), rate / T * (t - np.sin(c * t) / c),
-             rate / T * (1.0 - np.cos(c * t)))
+            (rate * (t - T / 2.0), rate, 0.0)
+            if t >= T
+            else (
+                rate / T * (t * t / 2.0 + (np.cos(c * t) - 1.0) / c**2),
+                rate / T * (t - np.sin(c * t) / c),
+                rate / T * (1.0 - np.cos(c * t)),
+            )
         )
     if kind == "pulse":
         start, end = data["start_s"], data["start_s"] + data["duration_s"]
@@ -60,6 +66,6 @@ def breaks_of(item):
             breaks.add(item["duration_s"])
         item = list(item.values())
     if isinstance(item, list):
-        for each in item:
-            breaks |= breaks_of(each)
+        for element in item:
+            breaks |= breaks_of(element)
     return breaks

@@ -59,9 +59,9 @@ def check_recorded(run: RunFile) -> None:
 
 
 def _refuse(problems: Iterator[Defect]) -> None:
-    found = [str(problem) for problem in problems]
-    if found:
-        raise CaseError("\n".join(found))
+    lines = [str(problem) for problem in problems]
+    if lines:
+        raise CaseError("\n".join(lines))
 
 
 def _run(run: RunFile) -> Iterator[Defect]:

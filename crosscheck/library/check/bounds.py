@@ -46,8 +46,10 @@ def _longest(run: RunFile, item: Comparison | Conservation) -> float:
     """The longer duration (s) of the compared variants."""
     sides = (item.a, item.b) if isinstance(item, Comparison) else ()
     names = {item.variant, *(side.variant for side in sides if side is not None)}
-    found = [find_variant(run, name) for name in names if name is not None]
-    return max((each.duration_s or run.duration_s for each in found if each is not None), default=run.duration_s)
+    variants = [find_variant(run, name) for name in names if name is not None]
+    return max(
+        (duration.duration_s or run.duration_s for duration in variants if duration is not None), default=run.duration_s
+    )
 
 
 def _remedy(item: Comparison | Conservation, key: str) -> str:
@@ -62,7 +64,7 @@ def _remedy(item: Comparison | Conservation, key: str) -> str:
 def _covered(item: Comparison, place: Place) -> Iterator[Defect]:
     """Every pattern with a goal must have a band: of the same pattern, or of one that includes it or a part of it."""
     for pattern in item.goals:
-        if not any(_related(pattern, each) for each in item.band):
+        if not any(_related(pattern, channel) for channel in item.band):
             yield problem(place, f'no band for "{pattern}"', f'add "{pattern}" = [low, high]')
 
 

@@ -39,9 +39,9 @@ def _of_no_verdict(where: str, variants: Set[str]) -> str:
     if part_of(channel) is None:
         return f'there is no kind of channel such as "{channel}"'
     for side in sides:
-        found = SIDE.fullmatch(side)
-        if found is None:
+        match = SIDE.fullmatch(side)
+        if match is None:
             return f'"{side}" is not an engine with a variant in brackets'
-        if found[1] not in variants:
-            return f'the run file has no variant "{found[1]}"'
+        if match[1] not in variants:
+            return f'the run file has no variant "{match[1]}"'
     return ""

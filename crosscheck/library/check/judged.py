@@ -94,7 +94,7 @@ def check_open(run: RunFile, item: OpenChannels, place: Place) -> Iterator[Defec
 def check_chart(run: RunFile, chart: Chart, place: Place) -> Iterator[Defect]:
     yield from check_pattern(chart.observable, place.key("observable"))
     names = [variant.name for variant in run.variants]
-    for key, name in (*(("variants", each) for each in chart.variants), ("reference", chart.reference)):
+    for key, name in (*(("variants", variant) for variant in chart.variants), ("reference", chart.reference)):
         if name not in names:
             yield no_variant(name, names, place.key(key))
 

@@ -86,7 +86,7 @@ def _route(run: RunFile, recipe: ReferenceRecipe, route: ReferenceRoute, place: 
     name = route.variant or recipe.variant
     variant = find_variant(run, name)
     if variant is None:
-        yield no_variant(name, [each.name for each in run.variants], place.key("variant"))
+        yield no_variant(name, [variant.name for variant in run.variants], place.key("variant"))
         return
     for key, file in (("exact", route.exact), ("equations", route.equations)):
         if file and (route.efforts or route.variant):

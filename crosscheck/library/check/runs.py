@@ -13,7 +13,7 @@ def check_sides_run(run: RunFile, name: str, engines: Iterable[str], place: Plac
     """The variant must exist and be run by the engines."""
     variant = find_variant(run, name)
     if variant is None:
-        yield no_variant(name, [each.name for each in run.variants], place)
+        yield no_variant(name, [variant.name for variant in run.variants], place)
     else:
         yield from check_engines_run(variant, engines, place)
 
@@ -35,7 +35,10 @@ def check_engines_once(engines: Sequence[str], place: Place) -> Iterator[Defect]
 def check_same_times(run: RunFile, a: ComparisonSide, b: ComparisonSide, place: Place) -> Iterator[Defect]:
     """Two sides that are compared must have the same sample times."""
     variants = [find_variant(run, side.variant) for side in (a, b)]
-    if len({(each.duration_s or run.duration_s, each.samples or run.samples) for each in variants if each}) > 1:
+    if (
+        len({(variant.duration_s or run.duration_s, variant.samples or run.samples) for variant in variants if variant})
+        > 1
+    ):
         text = f'"{a.variant}" and "{b.variant}" have other sample times'
         yield problem(place, text, "give both the same duration_s and samples")
 

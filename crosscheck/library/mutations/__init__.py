@@ -27,11 +27,7 @@ from flexmb.scene.schema import Scene
 ROOMS = (
     inertia, frames, couplings, hinges, connectors, wheels, gravity, loads, modes, time_courses, feedback, events,
 )  # fmt: skip
-CATALOGUE: dict[MutationKind, Mutation] = {
-    each.name: each
-    for room in ROOMS
-    for each in room.MUTATIONS
-}
+CATALOGUE: dict[MutationKind, Mutation] = {mutation.name: mutation for room in ROOMS for mutation in room.MUTATIONS}
 
 
 def mutate(scene: Scene, mutation: MutationKind, target: str) -> Scene:

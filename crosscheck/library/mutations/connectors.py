@@ -23,10 +23,10 @@ PLACES = ("position_a", "position_b")
 
 def connectors(scene: Scene) -> Iterator[MutationTarget]:
     """All connectors; those that only pull or only push are separate kinds."""
-    for each in scene.connectors:
-        acts = getattr(each, "acts", "both")
-        kind = str(each.__struct_config__.tag)
-        yield MutationTarget(each.name, kind if acts == "both" else f"{kind} in {acts}")
+    for connector in scene.connectors:
+        acts = getattr(connector, "acts", "both")
+        kind = str(connector.__struct_config__.tag)
+        yield MutationTarget(connector.name, kind if acts == "both" else f"{kind} in {acts}")
 
 
 def _scaled(stems: tuple[str, ...], factor: float) -> SceneChange:
@@ -77,7 +77,7 @@ def _linear_first(bushing: Bushing) -> Bushing:
 
 def _never_pressed(scene: Scene, target: str) -> str:
     """A stop without stiffness stops nothing."""
-    connector = next(each for each in scene.connectors if each.name == target)
+    connector = next(connector for connector in scene.connectors if connector.name == target)
     return "" if by_stem(connector).get("stop_stiffness") else "its stops have no stiffness"
 
 

@@ -14,16 +14,16 @@ from flexmb.scene.tree import coupled
 
 def couplings(scene: Scene) -> Iterator[MutationTarget]:
     """All couplings; those between angles, between displacements and of both are separate kinds."""
-    for each in scene.couplings:
-        angular = {related.named.coordinate.ANGULAR for related in coupled(scene, each)}
+    for coupling in scene.couplings:
+        angular = {related.named.coordinate.ANGULAR for related in coupled(scene, coupling)}
         what = "of both" if len(angular) > 1 else "of angles" if True in angular else "of displacements"
-        yield MutationTarget(each.name, f"coupling {what}")
+        yield MutationTarget(coupling.name, f"coupling {what}")
 
 
 def _ratios(factor: float) -> SceneChange:
     @of_coupling
     def scaled(coupling: Coupling) -> Coupling:
-        return replace(coupling, terms=tuple(replace(each, ratio=factor * each.ratio) for each in coupling.terms))
+        return replace(coupling, terms=tuple(replace(term, ratio=factor * term.ratio) for term in coupling.terms))
 
     return scaled
 

@@ -19,8 +19,8 @@ OTHER_WAY = {"rising": "falling", "falling": "rising"}
 
 def events(scene: Scene) -> Iterator[MutationTarget]:
     """All events; one kind for each list of actions."""
-    for each in scene.events:
-        yield MutationTarget(each.name, "event: " + ", ".join(str(act.__struct_config__.tag) for act in each.actions))
+    for event in scene.events:
+        yield MutationTarget(event.name, "event: " + ", ".join(str(act.__struct_config__.tag) for act in event.actions))
 
 
 def _of_actions(change: Callable[[Action], Action]) -> SceneChange:
@@ -63,7 +63,7 @@ def _crossing(scene: Scene, target: str) -> Scene:
 
 
 def _dropped(scene: Scene, target: str) -> Scene:
-    return replace(scene, events=tuple(each for each in scene.events if each.name != target))
+    return replace(scene, events=tuple(event for event in scene.events if event.name != target))
 
 
 def _not_held(action: Action) -> Action:

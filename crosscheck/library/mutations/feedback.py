@@ -32,15 +32,15 @@ CONJUGATE = (1.0, OPPOSITE, OPPOSITE, OPPOSITE)
 
 
 def controllers(scene: Scene) -> Iterator[MutationTarget]:
-    for each in scene.controllers:
-        kind = "continuous" if each.period_s is None else "sampled"
-        yield MutationTarget(each.name, f"{kind} {each.__struct_config__.tag}")
+    for controller in scene.controllers:
+        kind = "continuous" if controller.period_s is None else "sampled"
+        yield MutationTarget(controller.name, f"{kind} {controller.__struct_config__.tag}")
 
 
 def sensors(scene: Scene) -> Iterator[MutationTarget]:
-    for each in scene.sensors:
-        what = getattr(each, "quantity", "")
-        yield MutationTarget(each.name, f"{each.__struct_config__.tag} sensor {what}".strip())
+    for sensor in scene.sensors:
+        what = getattr(sensor, "quantity", "")
+        yield MutationTarget(sensor.name, f"{sensor.__struct_config__.tag} sensor {what}".strip())
 
 
 def _scaled(keys: Keys, factor: float) -> SceneChange:
@@ -65,7 +65,7 @@ def _in_time(change: Callable[[Controller, float], dict[str, float]]) -> SceneCh
 
 def _sensor(scene: Scene, target: str) -> tuple[Sensor, int]:
     """The sensor and its number of outputs."""
-    sensor = next((each for each in scene.sensors if each.name == target), None)
+    sensor = next((sensor for sensor in scene.sensors if sensor.name == target), None)
     width = None if sensor is None else sensor_width(scene, sensor)
     if sensor is None or width is None:
         raise CaseError(f'"{target}" is no sensor whose numbers can be counted in scene "{scene.name}"')
@@ -76,12 +76,12 @@ def _reading(scene: Scene, target: str, instead: Callable[[int | None], tuple[st
     """The controllers with the signals of a sensor replaced: of one of its outputs, or (None) of all."""
 
     def signals(reference: str) -> tuple[str, ...]:
-        found = named(reference)
-        return instead(found.number) if found is not None and found.name == target else (reference,)
+        signals = named(reference)
+        return instead(signals.number) if signals is not None and signals.name == target else (reference,)
 
     return tuple(
-        replace(each, inputs=tuple(name for reference in each.inputs for name in signals(reference)))
-        for each in scene.controllers
+        replace(controller, inputs=tuple(name for reference in controller.inputs for name in signals(reference)))
+        for controller in scene.controllers
     )
 
 
@@ -97,7 +97,11 @@ def _sensor_sign(scene: Scene, target: str) -> Scene:
     sensor, width = _sensor(scene, target)
     orientation = isinstance(sensor, MarkerSensor) and sensor.quantity == "orientation"
     signs = CONJUGATE if orientation else (OPPOSITE,) * width
-    reading = [each for each in scene.controllers if any(_names(reference, target) for reference in each.inputs)]
+    reading = [
+        controller
+        for controller in scene.controllers
+        if any(_names(reference, target) for reference in controller.inputs)
+    ]
     if not reading:
         raise CaseError(f'no controller reads sensor "{target}"')
     reverse = StateSpace(
@@ -127,8 +131,8 @@ def _sensor_component(scene: Scene, target: str) -> Scene:
 
 
 def _names(reference: str, sensor: str) -> bool:
-    found = named(reference)
-    return found is not None and found.name == sensor
+    names = named(reference)
+    return names is not None and names.name == sensor
 
 
 MUTATIONS = (

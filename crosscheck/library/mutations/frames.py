@@ -67,9 +67,11 @@ def _node_idle(scene: Scene, target: str) -> str:
     body, _, node = target.rpartition(".")
     mounted: tuple[Mounted, ...] = (*scene.wheels, *scene.point_masses, *scene.loads, *scene.markers)
     used = [(item.body, item.node) for item in mounted]
-    used += [end for each in scene.hinges for end in ((each.parent, each.parent_node), (each.child, each.child_node))]
-    between = [*scene.closures, *(each for each in scene.connectors if isinstance(each, BetweenNodes))]
-    used += [(end.body, end.node) for each in between for end in ends(each)]
+    used += [
+        end for hinge in scene.hinges for end in ((hinge.parent, hinge.parent_node), (hinge.child, hinge.child_node))
+    ]
+    between = [*scene.closures, *(connector for connector in scene.connectors if isinstance(connector, BetweenNodes))]
+    used += [(end.body, end.node) for connector in between for end in ends(connector)]
     return "" if (body, node) in used else "nothing is mounted at the node, and no marker shows it"
 
 

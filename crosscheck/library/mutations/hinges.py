@@ -48,8 +48,10 @@ def _hinge_axis(hinge: Hinge) -> Hinge:
 def _reversal_is_a_name(scene: Scene, target: str) -> str:
     """Reversing the sign of a coordinate has no effect if nothing depends on the sign."""
     hinge = next(hinge for hinge in scene.hinges if hinge.name == target)
-    coupled = {each.hinge for each in scene.couplings} | {term.hinge for each in scene.couplings for term in each.terms}
-    if target in coupled or any(getattr(each, "hinge", "") == target for each in scene.connectors):
+    coupled = {coupling.hinge for coupling in scene.couplings} | {
+        term.hinge for coupling in scene.couplings for term in coupling.terms
+    }
+    if target in coupled or any(getattr(connector, "hinge", "") == target for connector in scene.connectors):
         return ""
     for _, coordinate in coordinates(hinge):
         driven = coordinate.effort is not None or coordinate.prescribed is not None
@@ -99,7 +101,7 @@ def _damping(factor: float) -> SceneChange:
         match body:
             case BeamBody():
                 ratio = body.modes.damping_ratio
-                less = tuple(factor * each for each in ratio) if isinstance(ratio, tuple) else factor * ratio
+                less = tuple(factor * component for component in ratio) if isinstance(ratio, tuple) else factor * ratio
                 return replace(body, modes=replace(body.modes, damping_ratio=less))
             case ModalBody() if body.damping:
                 return replace(body, damping=scaled(body.damping, factor))
@@ -137,7 +139,7 @@ def _rest(coordinate: Coordinate) -> Coordinate:
 
 def _slack(scene: Scene, target: str) -> str:
     hinge = next(hinge for hinge in scene.hinges if hinge.name == target)
-    sprung = any(each.spring[0] for _, each in coordinates(hinge))
+    sprung = any(coordinate.spring[0] for _, coordinate in coordinates(hinge))
     return "" if sprung else "it has no spring that could be at rest somewhere"
 
 
@@ -178,9 +180,7 @@ def _speed_axes(hinge: Hinge) -> Hinge:
         raise CaseError(f'the speeds of hinge "{hinge.name}" have no axes: "speed_axes" needs a free or ball joint')
     R = rotation_matrix(hinge.quaternion)
     names = {"angular_velocity_rad_s", "velocity_m_s"} & set(hinge.__struct_fields__)
-    return replace(
-        hinge, **{name: tuple(map(float, np.asarray(getattr(hinge, name)) @ R)) for name in names}
-    )
+    return replace(hinge, **{name: tuple(map(float, np.asarray(getattr(hinge, name)) @ R)) for name in names})
 
 
 @of_hinge

@@ -48,11 +48,11 @@ def along(vector: Vector, axis: int) -> bool:
 def _is_own_image(scene: Scene, axis: int) -> bool:
     return (
         within(scene.gravity_m_s2, axis)
-        and all(_body(each, axis, _mounted(scene, each.name)) for each in scene.bodies)
-        and all(_hinge(each, axis) for each in scene.hinges)
-        and all(_closure(each, axis) for each in scene.closures)
-        and all(_wheel(each, axis) for each in scene.wheels)
-        and all(_load(each, axis) for each in scene.loads)
+        and all(_body(body, axis, _mounted(scene, body.name)) for body in scene.bodies)
+        and all(_hinge(hinge, axis) for hinge in scene.hinges)
+        and all(_closure(closure, axis) for closure in scene.closures)
+        and all(_wheel(wheel, axis) for wheel in scene.wheels)
+        and all(_load(load, axis) for load in scene.loads)
     )
 
 
@@ -60,8 +60,10 @@ def _mounted(scene: Scene, body: str) -> set[str]:
     """The nodes of a body at which more than markers are."""
     carried: tuple[Wheel | Load, ...] = (*scene.wheels, *scene.loads)
     used = [(item.body, item.node) for item in carried]
-    used += [end for each in scene.hinges for end in ((each.parent, each.parent_node), (each.child, each.child_node))]
-    used += [(end.body, end.node) for each in scene.closures for end in ends(each)]
+    used += [
+        end for hinge in scene.hinges for end in ((hinge.parent, hinge.parent_node), (hinge.child, hinge.child_node))
+    ]
+    used += [(end.body, end.node) for closure in scene.closures for end in ends(closure)]
     return {node for name, node in used if name == body}
 
 
@@ -73,7 +75,7 @@ def _body(body: Body, axis: int, mounted: set[str]) -> bool:
             frames = all(within(node.position_m, axis) and _turned(node.quaternion, axis) for node in nodes)
             return frames and within(body.com_m, axis) and _inertia(body.inertia_kg_m2, axis)
         case BeamBody():
-            lumps = all(within(each.com_m, axis) and _inertia(each.inertia_kg_m2, axis) for each in body.tip_masses)
+            lumps = all(within(mass.com_m, axis) and _inertia(mass.inertia_kg_m2, axis) for mass in body.tip_masses)
             return axis != X and lumps and all(_turned(node.quaternion, axis) for node in body.nodes)
         case ModalBody() | SidBody():
             return False
@@ -88,7 +90,7 @@ def _hinge(hinge: Hinge, axis: int) -> bool:
         and _turned(hinge.parent_quaternion, axis)
         and _turned(hinge.child_quaternion, axis)
     )
-    return frames and all(_freedom(each, axis) for each in hinge.freedoms)
+    return frames and all(_freedom(freedom, axis) for freedom in hinge.freedoms)
 
 
 def _freedom(freedom: Freedom, axis: int) -> bool:

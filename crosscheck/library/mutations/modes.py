@@ -124,7 +124,7 @@ def _equally_stiff(scene: Scene, target: str) -> str:
     body = _in_modes(scene, target)
     if not isinstance(body, ModalBody):
         return ""
-    right, wrong = (np.asarray(each.stiffness) for each in (body, _order(body)))
+    right, wrong = (np.asarray(matrix.stiffness) for matrix in (body, _order(body)))
     same = np.max(np.abs(wrong - right)) <= ROUNDING * np.max(np.abs(right[:2, :2]))
     return "the first two modes are equally stiff: exchanged, their stiffness is the same" if same else ""
 
@@ -156,9 +156,9 @@ def _bent_across(station: BeamStation) -> BeamStation:
 
 @of_body
 def _on_the_axis(body: Body) -> Body:
-    if not isinstance(body, BeamBody) or not any(any(each.reference_point_m) for each in body.stations):
+    if not isinstance(body, BeamBody) or not any(any(station.reference_point_m) for station in body.stations):
         raise CaseError(f'control "section_point" changes beams with a reference point off the axis, not "{body.name}"')
-    return replace(body, stations=tuple(replace(each, reference_point_m=(0.0, 0.0)) for each in body.stations))
+    return replace(body, stations=tuple(replace(station, reference_point_m=(0.0, 0.0)) for station in body.stations))
 
 
 MUTATIONS = (

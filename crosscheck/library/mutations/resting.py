@@ -42,7 +42,7 @@ def is_clamped_along_world(scene: Scene, name: str) -> bool:
     hinge = next(hinge for hinge in scene.hinges if hinge.child == name)
     nodes = [] if isinstance(body, SidBody) else [node.quaternion for node in body.nodes]
     turned = [*nodes, hinge.parent_quaternion, hinge.child_quaternion]
-    return isinstance(hinge, Weld) and hinge.parent == GROUND and all(each == IDENTITY for each in turned)
+    return isinstance(hinge, Weld) and hinge.parent == GROUND and all(quaternion == IDENTITY for quaternion in turned)
 
 
 def _held(body: Body, hinge: Hinge) -> bool:
@@ -77,6 +77,6 @@ def _free(scene: Scene, body: Body, hinge: Free) -> bool:
     if not isinstance(body, RigidBody) or len(scene.bodies) > 1 or scene.closures:
         return False
     places = [body.com_m, hinge.child_position_m, node_frame(body, hinge.child_node).position]
-    places += [place for each in scene.wheels for place in (each.offset_m, node_frame(body, each.node).position)]
-    forces = any(each.type == "force" for each in scene.loads)
+    places += [place for wheel in scene.wheels for place in (wheel.offset_m, node_frame(body, wheel.node).position)]
+    forces = any(load.type == "force" for load in scene.loads)
     return not (forces or any(hinge.velocity_m_s) or any(any(place) for place in places))

@@ -33,17 +33,17 @@ PHASE_RAD = 0.01
 def _motors(scene: Scene) -> Iterator[MutationTarget]:
     """Hinges and wheels with a motor, and springs with an actuator."""
     for hinge in scene.hinges:
-        if any(each.effort is not None for _, each in coordinates(hinge)):
+        if any(coordinate.effort is not None for _, coordinate in coordinates(hinge)):
             yield MutationTarget(hinge.name, "motor of a hinge")
     yield from (MutationTarget(wheel.name, "motor of a wheel") for wheel in scene.wheels if wheel.torque_Nm is not None)
-    yield from (MutationTarget(each.name, "actuator of a connector") for each, _ in _actuators(scene))
+    yield from (MutationTarget(connector.name, "actuator of a connector") for connector, _ in _actuators(scene))
 
 
 def _driven(scene: Scene) -> Iterator[MutationTarget]:
     """Everything with a function of time; one kind for each kind of function."""
     for hinge in scene.hinges:
-        for _, each in coordinates(hinge):
-            for what, function in (("motor", each.effort), ("drive", each.prescribed)):
+        for _, coordinate in coordinates(hinge):
+            for what, function in (("motor", coordinate.effort), ("drive", coordinate.prescribed)):
                 if function is not None:
                     yield MutationTarget(hinge.name, f"{what}, {_kind(function)}")
     for wheel in scene.wheels:
@@ -51,7 +51,7 @@ def _driven(scene: Scene) -> Iterator[MutationTarget]:
             if function is not None:
                 yield MutationTarget(wheel.name, f"wheel, {_kind(function)}")
     yield from (MutationTarget(load.name, f"load, {_kind(load.function)}") for load in scene.loads)
-    yield from (MutationTarget(each.name, f"actuator, {_kind(force)}") for each, force in _actuators(scene))
+    yield from (MutationTarget(connector.name, f"actuator, {_kind(force)}") for connector, force in _actuators(scene))
     for sensor in scene.sensors:
         if isinstance(sensor, ProfileSensor):
             yield MutationTarget(sensor.name, f"profile, {_kind(sensor.function)}")
@@ -59,11 +59,11 @@ def _driven(scene: Scene) -> Iterator[MutationTarget]:
 
 def _actuators(scene: Scene) -> Iterator[tuple[SpringDamper | HingeSpring, Function]]:
     """Springs with a function of time, and that."""
-    for each in scene.connectors:
-        if isinstance(each, SpringDamper | HingeSpring):
-            function = actuator(each)
+    for connector in scene.connectors:
+        if isinstance(connector, SpringDamper | HingeSpring):
+            function = actuator(connector)
             if function is not None:
-                yield each, function
+                yield connector, function
 
 
 def _on_item(scene: Scene, target: str, change: Change, motion: Change | None = None) -> Scene:
@@ -87,7 +87,7 @@ def _on_item(scene: Scene, target: str, change: Change, motion: Change | None = 
         return of_wheel(with_functions)(scene, target)
     if any(load.name == target for load in scene.loads):
         return of_load(with_function)(scene, target)
-    if any(each.name == target for each, _ in _actuators(scene)):
+    if any(connector.name == target for connector, _ in _actuators(scene)):
         return of_connector(with_actuator)(scene, target)
     if any(isinstance(sensor, ProfileSensor) and sensor.name == target for sensor in scene.sensors):
         return of_sensor(with_function)(scene, target)

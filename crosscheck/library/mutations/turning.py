@@ -59,8 +59,8 @@ def _axis(parent: Body | None, carried: Real | None, body: Body, hinge: Hinge) -
 
 def _own(hinge: Hinge) -> Real | None:
     """The axis of a hinge in its own axes, zero where it does not turn, None where it turns otherwise."""
-    lines = [each for each in hinge.freedoms if isinstance(each, ScalarFreedom)]
-    turning = [np.asarray(each.axis) / np.linalg.norm(each.axis) for each in lines if each.turns]
+    lines = [freedom for freedom in hinge.freedoms if isinstance(freedom, ScalarFreedom)]
+    turning = [np.asarray(line.axis) / np.linalg.norm(line.axis) for line in lines if line.turns]
     if len(lines) < len(hinge.freedoms) or len(turning) > 1:
         return None
     return turning[0] if turning else np.zeros(3)

@@ -30,8 +30,8 @@ def _boosted(scene: Scene) -> Counterpart:
     forces, which depends on how fast their points move."""
     without_feedback(scene)
     held = [hinge.name for hinge in scene.hinges if hinge.parent == GROUND and not isinstance(hinge, Free)]
-    pairs = [*scene.closures, *(each for each in scene.connectors if isinstance(each, BetweenNodes))]
-    held += [each.name for each in pairs if GROUND in (each.body_a, each.body_b)]
+    pairs = [*scene.closures, *(connector for connector in scene.connectors if isinstance(connector, BetweenNodes))]
+    held += [pair.name for pair in pairs if GROUND in (pair.body_a, pair.body_b)]
     if held:
         raise NotApplicable(f"it stands on the ground by {', '.join(held)}")
     mass, gravity = total_mass(scene), np.asarray(scene.gravity_m_s2)
@@ -54,7 +54,7 @@ def _boosted(scene: Scene) -> Counterpart:
                 restored[name] = rows - BOOST_M_S
         return restored
 
-    hinges = tuple(_faster(each) if each.parent == GROUND else each for each in scene.hinges)
+    hinges = tuple(_faster(hinge) if hinge.parent == GROUND else hinge for hinge in scene.hinges)
     return Counterpart(msgspec.structs.replace(scene, hinges=hinges), back)
 
 

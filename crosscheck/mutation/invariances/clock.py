@@ -30,10 +30,10 @@ WHOLE_TURNS = 1
 def _rewritten(scene: Scene) -> Counterpart:
     without_feedback(scene)
     without_events(scene)
-    found: list[Function] = []
+    functions: list[Function] = []
 
     def on_another_clock(function: Function) -> Function:
-        found.append(function)
+        functions.append(function)
         match function:
             case Ramp():
                 start = function.start_s + SHIFT_S

@@ -119,7 +119,7 @@ def total_mass(scene: Scene) -> float:
             case RigidBody():
                 mass += body.mass_kg
             case BeamBody():
-                x, density = np.array([(each.x_m, mass_per_length(each)) for each in body.stations]).T
+                x, density = np.array([(station.x_m, mass_per_length(station)) for station in body.stations]).T
                 mass += float(np.trapezoid(density, x)) + sum(tip.mass_kg for tip in body.tip_masses)
             case ModalBody() if body.points:
                 mass += sum(point.mass_kg for point in body.points)

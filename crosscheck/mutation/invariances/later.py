@@ -55,7 +55,7 @@ def _later(scene: Scene) -> Counterpart:
 
 def _coordinates_as_their_profiles_begin(item: Item) -> Item:
     """Without initial values of what is prescribed: a scene may repeat there what its profile is at t = 0."""
-    return with_coordinates(item, [_as_its_profile_begins(each) for _, each in coordinates(item)])
+    return with_coordinates(item, [_as_its_profile_begins(coordinate) for _, coordinate in coordinates(item)])
 
 
 def _as_its_profile_begins(item: Moved) -> Moved:
@@ -76,9 +76,9 @@ def _refuse_what_cannot_be_shifted(scene: Scene) -> None:
     clocks = {sensor.name for sensor in scene.sensors if isinstance(sensor, TimeSensor)}
     for controller in scene.controllers:
         for reference in controller.inputs:
-            found = named(reference)
-            if found is not None and found.name in clocks:
-                raise NotApplicable(f'controller "{controller.name}" reads the time by sensor "{found.name}"')
+            names = named(reference)
+            if names is not None and names.name in clocks:
+                raise NotApplicable(f'controller "{controller.name}" reads the time by sensor "{names.name}"')
     for event in scene.events:
         for action in event.actions:
             if isinstance(action, Change) and action.path.rpartition(".")[2] in OF_THE_CLOCK:

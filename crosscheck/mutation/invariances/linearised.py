@@ -95,7 +95,7 @@ def relation(
 
 def has_beam_modes(scene: Scene) -> bool:
     """Whether the modes of a body are made with the model."""
-    return any(isinstance(each, BeamBody) and modes_of(each) for each in scene.bodies)
+    return any(isinstance(body, BeamBody) and modes_of(body) for body in scene.bodies)
 
 
 def by_freedom(

@@ -62,13 +62,15 @@ def _mirrored(scene: Scene) -> Counterpart:
     drives = {}
     for item in (*scene.hinges, *scene.point_masses):
         pairs = zip(coordinates(item), _signs(item), strict=True)
-        drives[item.name] = np.array([sign for (_, each), sign in pairs if each.prescribed is not None])
+        drives[item.name] = np.array([sign for (_, coordinate), sign in pairs if coordinate.prescribed is not None])
 
     def back(times: Real, channels: Channels) -> Channels:
-        found = by_kind(channels, lambda rows: rows * polar, lambda rows: rows * axial, lambda q: q * quaternion)
+        channels_back = by_kind(
+            channels, lambda rows: rows * polar, lambda rows: rows * axial, lambda q: q * quaternion
+        )
         return {
             name: rows * drives.get(name.partition(":")[2], 1.0) if name.startswith("drive:") else rows
-            for name, rows in found.items()
+            for name, rows in channels_back.items()
         }
 
     other = msgspec.structs.replace(_reflected(scene), couplings=_couplings(scene))
@@ -83,22 +85,22 @@ def _ratios(item: Item) -> list[float]:
 
 def _couplings(scene: Scene) -> tuple[Coupling, ...]:
     """Relations of the coordinates as the mirror counts them."""
-    found = []
+    couplings = []
     for coupling in scene.couplings:
-        led, *leading = (_signs(each.hinge)[each.place] for each in coupled(scene, coupling))
+        led, *leading = (_signs(member.hinge)[member.place] for member in coupled(scene, coupling))
         terms = tuple(
             msgspec.structs.replace(term, ratio=led * own * term.ratio)
             for term, own in zip(coupling.terms, leading, strict=True)
         )
-        found.append(msgspec.structs.replace(coupling, terms=terms, offset=led * coupling.offset + 0.0))
-    return tuple(found)
+        couplings.append(msgspec.structs.replace(coupling, terms=terms, offset=led * coupling.offset + 0.0))
+    return tuple(couplings)
 
 
 def _reflected(item: Any) -> Any:
     """The mirror image of a struct with all structs in it."""
     if isinstance(item, Hinge | PointMass):
         counted = zip(coordinates(item), _signs(item), strict=True)
-        changed = [each if sign > 0.0 else _opposite(each) for (_, each), sign in counted]
+        changed = [coordinate if sign > 0.0 else _opposite(coordinate) for (_, coordinate), sign in counted]
         item = with_coordinates(item, changed)
     if isinstance(item, Hinge | PointMass | Wheel):
         item = _with_axes(item)
@@ -133,13 +135,13 @@ def _with_matrices(item: S, signs: tuple[float, ...], *keys: str) -> S:
     """An item with its matrices (6,6) under these keys as the mirror shows them, those that it has."""
     given = {key: value for key in keys if (value := getattr(item, key)) is not None}
     seen = {key: np.array(value) * np.outer(signs, signs) + 0.0 for key, value in given.items()}
-    return msgspec.structs.replace(item, **{key: tuple(map(tuple, each.tolist())) for key, each in seen.items()})
+    return msgspec.structs.replace(item, **{key: tuple(map(tuple, rows.tolist())) for key, rows in seen.items()})
 
 
 def _with_axes(item: M) -> M:
     """An item with its own axes as the mirror shows them: polar where something slides along them, axial where it only
     turns. A right-handed screw is a left-handed one."""
-    slides = any(isinstance(each, ScalarFreedom) and each.motion == "slide" for each in item.freedoms)
+    slides = any(isinstance(freedom, ScalarFreedom) and freedom.motion == "slide" for freedom in item.freedoms)
     changes: dict[str, Any] = {}
     for key in item.__struct_fields__:
         value = getattr(item, key)
@@ -183,14 +185,14 @@ def _value(key: str, value: Any) -> Any:
     if isinstance(value, msgspec.Struct):
         return _reflected(value)
     if isinstance(value, tuple) and value and isinstance(value[0], msgspec.Struct):
-        return tuple(_reflected(each) for each in value)
+        return tuple(_reflected(element) for element in value)
     return value
 
 
 def _signed(value: Any, signs: tuple[float, ...]) -> Any:
     """Signs on the components of a vector, or of vectors in tuples however deep; no zero gets a sign."""
     if value and isinstance(value[0], tuple):
-        return tuple(_signed(each, signs) for each in value)
+        return tuple(_signed(element, signs) for element in value)
     return tuple(sign * number + 0.0 for sign, number in zip(signs, value, strict=False))
 
 

@@ -68,10 +68,12 @@ def _moved(scene: Scene) -> Counterpart:
         return vector(np.asarray(position) + STEP_M), orientation
 
     def back(times: Real, channels: Channels) -> Channels:
-        found = with_energy(channels, {"gravity": np.full(len(times), potential)})
-        if "momentum.linear" in found:
-            found["momentum.angular"] = found["momentum.angular"] - np.cross(STEP_M, found["momentum.linear"])
-        return {name: rows - STEP_M if name.endswith(".position") else rows for name, rows in found.items()}
+        channels_back = with_energy(channels, {"gravity": np.full(len(times), potential)})
+        if "momentum.linear" in channels_back:
+            channels_back["momentum.angular"] = channels_back["momentum.angular"] - np.cross(
+                STEP_M, channels_back["momentum.linear"]
+            )
+        return {name: rows - STEP_M if name.endswith(".position") else rows for name, rows in channels_back.items()}
 
     other = on_ground(scene, placed)
     return Counterpart(other, back, linear=relation(scene, other))

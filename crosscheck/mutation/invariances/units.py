@@ -125,15 +125,15 @@ def _ratios(item: Item) -> list[float]:
 
 def _couplings(scene: Scene) -> tuple[Coupling, ...]:
     """Offsets in the unit of the coordinate that is led, ratios in that unit per unit of the coordinate that leads."""
-    found = []
+    couplings = []
     for coupling in scene.couplings:
-        led, *leading = (OF_COORDINATE[each.named.coordinate.ANGULAR].factor for each in coupled(scene, coupling))
+        led, *leading = (OF_COORDINATE[member.named.coordinate.ANGULAR].factor for member in coupled(scene, coupling))
         terms = tuple(
             msgspec.structs.replace(term, ratio=term.ratio * led / own)
             for term, own in zip(coupling.terms, leading, strict=True)
         )
-        found.append(msgspec.structs.replace(coupling, terms=terms, offset=coupling.offset * led))
-    return tuple(found)
+        couplings.append(msgspec.structs.replace(coupling, terms=terms, offset=coupling.offset * led))
+    return tuple(couplings)
 
 
 def _factor(channel: str, drives: dict[str, float]) -> float:
@@ -141,7 +141,7 @@ def _factor(channel: str, drives: dict[str, float]) -> float:
         return drives[channel.partition(":")[2]]
     if channel.startswith(("energy.", "work")):
         return ENERGY.factor
-    return next((each.factor for ending, each in OF_CHANNEL.items() if channel.endswith(ending)), 1.0)
+    return next((unit.factor for ending, unit in OF_CHANNEL.items() if channel.endswith(ending)), 1.0)
 
 
 def _drives(scene: Scene) -> dict[str, Any]:
@@ -149,9 +149,9 @@ def _drives(scene: Scene) -> dict[str, Any]:
     their loads."""
     factors: dict[str, Any] = {wheel.name: ENERGY.factor for wheel in scene.wheels}
     for item in (*scene.hinges, *scene.point_masses):
-        prescribed = [each for _, each in coordinates(item) if each.prescribed is not None]
+        prescribed = [coordinate for _, coordinate in coordinates(item) if coordinate.prescribed is not None]
         if prescribed:
-            factors[item.name] = [EFFORT[each.ANGULAR].factor for each in prescribed]
+            factors[item.name] = [EFFORT[coordinate.ANGULAR].factor for coordinate in prescribed]
     for connector in scene.connectors:
         if isinstance(connector, AlongHinge):
             factors[connector.name] = EFFORT[connector.ANGULAR].factor
@@ -203,14 +203,14 @@ def _stiffening(spring: SpringDamper | AngularSpring | LinearSpring) -> Each:
 
 def _converted(value: Any, dimension: Dimension | Each) -> Any:
     if not isinstance(dimension, Dimension):
-        return tuple(_converted(each, own) for each, own in zip(value, dimension, strict=True))
+        return tuple(_converted(component, own) for component, own in zip(value, dimension, strict=True))
     if isinstance(value, Function):
         return slowed(scaled(value, dimension.factor), TIME)
     match value:
         case msgspec.Struct():
             return _in_units(value)
         case tuple():
-            return tuple(_converted(each, dimension) for each in value)
+            return tuple(_converted(component, dimension) for component in value)
         case float():
             return dimension.factor * value
     return value

@@ -129,10 +129,10 @@ def measure_drift(scene: Scene, step: float, kept: float) -> Measurement:
             return gap(step, SPAN, SLOW_RATE)
     mujoco = engine("mujoco")
     mujoco.version()  # raises EngineMissing
-    found = mujoco.compile(scene).simulate(Run(np.linspace(0.0, SPAN, SAMPLES)), Effort("step", step, "RK4"))
-    if found.status != "finished":
-        return Measurement(status="failed", message=found.message)
-    return opening(found.markers["a"].position, found.markers["b"].position)
+    trajectory = mujoco.compile(scene).simulate(Run(np.linspace(0.0, SPAN, SAMPLES)), Effort("step", step, "RK4"))
+    if trajectory.status != "finished":
+        return Measurement(status="failed", message=trajectory.message)
+    return opening(trajectory.markers["a"].position, trajectory.markers["b"].position)
 
 
 @cache

@@ -32,7 +32,11 @@ def scene(deflection: float, gyration: float) -> Scene:
     straight = (
         SceneBuilder("bent beam")
         .beam(
-            "beam", length=LENGTH, elements=8, section=section, level="linear",
+            "beam",
+            length=LENGTH,
+            elements=8,
+            section=section,
+            level="linear",
             modes=Modes(count=2, families=("bending_y",)),
         )  # fmt: skip
         .free("base", "ground", "beam")
@@ -72,7 +76,7 @@ def limits() -> tuple[Real, Real]:
     It is M0 + deflection M1: singular where -1/deflection is an eigenvalue of M1 with respect to M0.
     """
     radii = np.geomspace(GYRATION.low, GYRATION.high, KNOTS)
-    found = []
+    bounds = []
     for radius in radii:
         unit = scene(1.0, float(radius))
         dense = DenseSystem(unit)
@@ -80,8 +84,8 @@ def limits() -> tuple[Real, Real]:
         q[dense.tree.members[0].q_hinge] = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
         M0 = dense.mass_matrix(q)
         q[dense.tree.members[0].q_modes] = unit.modal_states[0].coordinates
-        found.append(-1.0 / eigh(dense.mass_matrix(q) - M0, M0, eigvals_only=True)[0])
-    return radii, np.array(found)
+        bounds.append(-1.0 / eigh(dense.mass_matrix(q) - M0, M0, eigvals_only=True)[0])
+    return radii, np.array(bounds)
 
 
 def excess(deflection: Real, gyration: Real) -> Real:

@@ -52,9 +52,9 @@ class Stepper:
             return path.position[:, 0], path.velocity[:, 3], "" if finished else why
         other = engine(self.engine)
         other.version()  # raises EngineMissing
-        found = other.compile(scene).simulate(Run(times), Effort("step", step, self.name))
-        path = found.markers["fast"]
-        return path.position[:, 0], path.velocity[:, 3], "" if found.status == "finished" else found.message
+        trajectory = other.compile(scene).simulate(Run(times), Effort("step", step, self.name))
+        path = trajectory.markers["fast"]
+        return path.position[:, 0], path.velocity[:, 3], "" if trajectory.status == "finished" else trajectory.message
 
 
 def slides(step: float, frequency: float) -> Scene:

@@ -86,11 +86,11 @@ def measure(algorithm: Algorithm, ratio: float, slender: float) -> Measurement:
         for at in states():
             M, wanted = exact(mass, thin, at)
             try:
-                found = system.accelerations(system.state(at.angles, at.rates), algorithm)
+                accelerations = system.accelerations(system.state(at.angles, at.rates), algorithm)
             except DynamicsError as error:
                 return Measurement(status="failed", message=str(error))
             weights = np.sqrt(np.diag(M))
-            errors.append(np.linalg.norm(weights * (found - wanted)) / np.linalg.norm(weights * wanted))
+            errors.append(np.linalg.norm(weights * (accelerations - wanted)) / np.linalg.norm(weights * wanted))
     return Measurement(float(np.log10(max(max(errors), ROUNDING))))
 
 

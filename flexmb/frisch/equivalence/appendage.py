@@ -113,26 +113,26 @@ def appendage_of(scene: Scene, body: str, modes: int | None = None) -> Appendage
     `DEFAULT_MODES`. Raises ValueError if the body does not exist, is not flexible or not clamped, or if anything is
     attached to it.
     """
-    found = next((candidate for candidate in scene.bodies if candidate.name == body), None)
-    if found is None:
+    body_of_name = next((candidate for candidate in scene.bodies if candidate.name == body), None)
+    if body_of_name is None:
         names = [candidate.name for candidate in scene.bodies if not isinstance(candidate, RigidBody)]
         raise ValueError(f'the scene has no flexible body "{body}": {closest(body, names)}')
-    if isinstance(found, RigidBody):
+    if isinstance(body_of_name, RigidBody):
         raise ValueError(f'body "{body}" is rigid: it has no modes to compare with a hinge; choose a flexible body')
-    if isinstance(found, SidBody):
+    if isinstance(body_of_name, SidBody):
         raise ValueError(f'body "{body}": SID files are not supported yet; use kind = "modal"')
     _check_limb_end(scene, body)
     name = f'body "{body}"'
     if modes is not None and modes < 1:
         raise ValueError(f"{name}: at least one mode is needed, got {modes}")
-    match found:
+    match body_of_name:
         case BeamBody():
-            chosen = appendage(flexible_model(_with_modes(found, modes)), name)
+            chosen = appendage(flexible_model(_with_modes(body_of_name, modes)), name)
         case ModalBody():
-            chosen = _first(appendage(flexible_model(found), name), modes)
+            chosen = _first(appendage(flexible_model(body_of_name), name), modes)
         case _:
-            assert_never(found)
-    return replace(chosen, level=found.level)
+            assert_never(body_of_name)
+    return replace(chosen, level=body_of_name.level)
 
 
 def _with_modes(body: BeamBody, modes: int | None) -> BeamBody:
@@ -160,8 +160,8 @@ def _check_limb_end(scene: Scene, body: str) -> None:
     attached += [f'point mass "{mass.name}"' for mass in scene.point_masses if mass.body == body]
     attached += [f'wheel "{wheel.name}"' for wheel in scene.wheels if wheel.body == body]
     attached += [f'closure "{closure.name}"' for closure in scene.closures if body in (closure.body_a, closure.body_b)]
-    ends = [each for each in scene.connectors if isinstance(each, BetweenNodes)]
-    attached += [f'connector "{each.name}"' for each in ends if body in (each.body_a, each.body_b)]
+    ends = [connector for connector in scene.connectors if isinstance(connector, BetweenNodes)]
+    attached += [f'connector "{end.name}"' for end in ends if body in (end.body_a, end.body_b)]
     if attached:
         raise ValueError(
             f'body "{body}" carries {", ".join(attached)}: a hinge cannot replace its modes, because it does not '

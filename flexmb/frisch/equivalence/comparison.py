@@ -68,8 +68,8 @@ def equivalence(
     if point is not None:
         fits[GIVEN] = fit_at(body, point, axes, modes)
     aligned = np.max(np.abs(axes), axis=1) > 1.0 - 1e-9
-    found = directions(body, np.vstack([np.eye(3), axes[~aligned]]))
-    return Equivalence(body, accuracy, fits, found, _verdicts(body, accuracy, fits.get(GIVEN, best)))
+    springs = directions(body, np.vstack([np.eye(3), axes[~aligned]]))
+    return Equivalence(body, accuracy, fits, springs, _verdicts(body, accuracy, fits.get(GIVEN, best)))
 
 
 def coupling_error(body: Appendage, fit: HingeFit) -> float:

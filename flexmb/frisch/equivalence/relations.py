@@ -241,11 +241,11 @@ def _choice(body: Appendage, axes: ArrayLike | None, modes: tuple[int, ...] | No
     if np.linalg.matrix_rank(unit, tol=1e-6) < len(unit):
         raise ValueError(f"{body.name}: the hinge axes are linearly dependent; leave one of them out")
     if modes is None:
-        found: list[int] = []
+        axes_chosen: list[int] = []
         for axis in unit:
-            gain = [-np.inf if n in found else _explained(body, axis, n) for n in range(body.mode_count)]
-            found.append(int(np.argmax(gain)))
-        modes = tuple(found)
+            gain = [-np.inf if n in axes_chosen else _explained(body, axis, n) for n in range(body.mode_count)]
+            axes_chosen.append(int(np.argmax(gain)))
+        modes = tuple(axes_chosen)
     if len(modes) != len(unit):
         raise ValueError(f"{body.name}: {len(unit)} hinge axes need as many modes, got {len(modes)}")
     return unit, modes

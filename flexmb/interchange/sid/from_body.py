@@ -68,7 +68,7 @@ def _second(model: FlexibleModel) -> FirstOrder:
     field = model.second
     if field is None:
         field = SecondOrder(*np.zeros((2, len(model.mass), 3, m, m)))
-    G, H = (np.moveaxis(each, 1, -1) for each in (field.translation, field.rotation))  # (n,m,m,3)
+    G, H = (np.moveaxis(part, 1, -1) for part in (field.translation, field.rotation))  # (n,m,m,3)
     c, psi, J = model.com_offset, np.swapaxes(model.rotation, 1, 2), model.inertia
     G = G + np.cross(H, c[:, None, None])
     rho, u = model.position + c, np.swapaxes(model.translation, 1, 2) + np.cross(psi, c[:, None])

@@ -135,7 +135,7 @@ class _Reader:
         if structure == SYMMETRIC:
             zero = _mirrored(zero)
             if first is not None:
-                first = np.stack([_mirrored(each) for each in np.moveaxis(first, 1, 0)], axis=1)
+                first = np.stack([_mirrored(part) for part in np.moveaxis(first, 1, 0)], axis=1)
         if zero.shape != expected[name] and name == "J":
             return inertia_of_six(Taylor(zero, first))
         return Taylor(
@@ -151,9 +151,7 @@ class _Reader:
             elif line.key in ("order", "nrow", "ncol", "nq", "nqn", "structure"):
                 head[line.key] = self._whole(line.value)
             else:
-                self._fail(
-                    f'"{line.word}" does not belong to {name}', "it has order, nrow, ..., m0(i,j), m1(i,k,j)"
-                )
+                self._fail(f'"{line.word}" does not belong to {name}', "it has order, nrow, ..., m0(i,j), m1(i,k,j)")
         return head, elements
 
     def _shape(self, name: str, expected: tuple[int, int], head: dict[str, int], start: int) -> tuple[int, int]:

@@ -91,7 +91,7 @@ class Sums:
         sid, scale = self.sid, Scale.of(self.sid)
         wanted = symmetric(self.P - _trace(self.P)[..., None, None] * np.eye(3))
         orders = ((0, 1, 2, 3, 4, 5), (0, 1, 2, 3, 5, 4))
-        order = min(orders, key=lambda each: largest(_of_six(sid.Oe.zero, each) - wanted))
+        order = min(orders, key=lambda order: largest(_of_six(sid.Oe.zero, order) - wanted))
         dust = ROUNDING * sid.mass * scale.shape * scale.reach
         self._compare("M1 of J", "Oe", wanted, _of_six(sid.Oe.zero, order), dust)
         if sid.Oe.first is None:

@@ -116,10 +116,10 @@ def with_sid_bodies(scene: Scene) -> Scene:
 
 
 def _from_its_file(body: SidBody) -> ModalBody:
-    found = imported_sid(read_sid(body.file), body.name, body.level)
-    for each in found.disagreements:
-        warnings.warn(f"{body.file}: {each}", SceneWarning, stacklevel=3)
-    return found.body
+    bodies = imported_sid(read_sid(body.file), body.name, body.level)
+    for disagreement in bodies.disagreements:
+        warnings.warn(f"{body.file}: {disagreement}", SceneWarning, stacklevel=3)
+    return bodies.body
 
 
 def _repaired(sid: Sid, disagreements: list[str]) -> Sid:
@@ -210,7 +210,7 @@ def _geometric_stiffness(sid: Sid, sums: Sums) -> dict[str, Real]:
     """Geometric stiffness under unit accelerations (3,m,m) and gradients (3,3,m,m); empty if the file has none."""
     Ct1 = np.zeros((sums.m, sums.m, 3)) if sid.Ct.first is None else sid.Ct.first
     Cr1 = np.zeros((sums.m, sums.m, 3)) if sid.Cr.first is None else sid.Cr.first
-    along, turning = (0.5 * (each + np.swapaxes(each, 0, 1)) for each in (Ct1, Cr1))
+    along, turning = (0.5 * (part + np.swapaxes(part, 0, 1)) for part in (Ct1, Cr1))
     moment = sums.change + 0.5 * cross_matrix(turning)
     if max(largest(along) * Scale.of(sid).reach, largest(moment)) <= PRINTED * largest(sums.Q):
         return {}

@@ -40,11 +40,11 @@ class SuperElement:
 
     def node(self, number: int) -> int:
         """The index of the node with this number; SuperElementError, which lists the numbers, if there is none."""
-        found = np.flatnonzero(self.ids == number)
-        if len(found) == 0:
+        rows = np.flatnonzero(self.ids == number)
+        if len(rows) == 0:
             some = ", ".join(map(str, self.ids[:8])) + (", ..." if len(self.ids) > 8 else "")
             raise SuperElementError(f"there is no node {number}: the nodes are {some}")
-        return int(found[0])
+        return int(rows[0])
 
     def lever(self) -> Real:
         """By row (N,), the length (m) that makes a displacement of it: 1 for translations, the reach for rotations.
@@ -53,9 +53,9 @@ class SuperElement:
         """
         arms = self.position - self.position.mean(axis=0)
         long = float(np.max(np.linalg.norm(arms, axis=1), initial=0.0)) or 1.0
-        found = np.ones(len(self.K))
-        found[self.place[:, 3:][self.place[:, 3:] >= 0]] = long
-        return found
+        lever = np.ones(len(self.K))
+        lever[self.place[:, 3:][self.place[:, 3:] >= 0]] = long
+        return lever
 
     def rigid(self, about: Real) -> Real:
         """The six rigid-body motions (N,6) about a point (3,) m: translations, then small rotations."""
@@ -82,7 +82,7 @@ def super_element(
     if not np.all(np.abs(position) <= LARGEST):
         raise SuperElementError(f"a coordinate of a node is not finite or beyond {LARGEST:g}: give positions in m")
     numbers = np.arange(1, len(position) + 1) if ids is None else np.asarray(ids, dtype=np.int64)
-    K, M = (_symmetric(name, each) for name, each in (("K", K), ("M", M)))
+    K, M = (_symmetric(name, matrix) for name, matrix in (("K", K), ("M", M)))
     place = _places(numbers, ["123456"] * len(position) if dofs is None else list(dofs))
     rows = int(np.count_nonzero(place >= 0))
     if not rows:
@@ -150,7 +150,7 @@ def _check_mass(element: SuperElement) -> None:
     mass = total.T @ element.M @ total
     mean = float(np.trace(mass)) / 3.0
     if not mean > 0.0 or np.max(np.abs(mass - mean * np.eye(3))) > ALIKE * mean:
-        found = ", ".join(f"{each:.6g}" for each in np.diag(mass))
+        found = ", ".join(f"{number:.6g}" for number in np.diag(mass))
         raise SuperElementError(
             f"the mass of M in x, y and z is {found} kg: a free structure has one mass; write M without supports and "
             "with mass at every displacement"

@@ -48,7 +48,7 @@ def read_super_element(
     if stiffness.rows is not None or mass.rows is not None:
         stiffness, mass, table = _by_labels(stiffness, mass, table)
     rows = max(len(stiffness.matrix), len(mass.matrix))
-    stiffness, mass = (_with_rows(each, rows) if each.open_end else each for each in (stiffness, mass))
+    stiffness, mass = (_with_rows(matrix, rows) if matrix.open_end else matrix for matrix in (stiffness, mass))
     table = _by_size(rows, table)
     return super_element(stiffness.matrix, mass.matrix, table.position, table.ids, table.dofs)
 
@@ -60,9 +60,9 @@ def _matrix(path: Path, letter: str) -> NamedMatrix:
         remedy = INSTEAD.get(ending, f"write the matrix as one of {', '.join(READERS)}")
         raise SuperElementError(f'{path}: "{ending}" is not a known format: {remedy}')
     found = READERS[ending](path)
-    chosen = found if len(found) == 1 else [each for each in found if each.name.upper().startswith(letter)]
+    chosen = found if len(found) == 1 else [matrix for matrix in found if matrix.name.upper().startswith(letter)]
     if len(chosen) != 1:
-        names = ", ".join(each.name for each in found) or "none"
+        names = ", ".join(matrix.name for matrix in found) or "none"
         raise SuperElementError(
             f"{path}: which matrix is {letter}? it has {names}: give a file with one whose name begins so"
         )
@@ -125,11 +125,11 @@ def _harwell_boeing(path: Path) -> Real:
         raise SuperElementError(f"{path} has more than {LIMIT // MIB} MiB: reduce the structure in its own program")
     kind = {"spmatrix": False} if "spmatrix" in signature(hb_read).parameters else {}  # SciPy changes what it gives
     try:
-        found = hb_read(path, **kind)
+        matrix = hb_read(path, **kind)
     except (ValueError, IndexError, OverflowError, MemoryError, TypeError) as error:
         raise SuperElementError(f"{path} is not a Harwell-Boeing file ({error}): write it again") from None
-    refuse_large(str(path), *found.shape)
-    dense = np.asarray(found.todense() if hasattr(found, "todense") else found)
+    refuse_large(str(path), *matrix.shape)
+    dense = np.asarray(matrix.todense() if hasattr(matrix, "todense") else matrix)
     if np.iscomplexobj(dense):
         raise SuperElementError(f"{path} is complex: give real matrices, without structural damping")
     return dense
@@ -145,10 +145,10 @@ def _text(path: Path) -> str:
 def _nodes(path: Path) -> Nodes:
     ending = path.suffix.lower()
     if ending in MESHES:
-        found = MESHES[ending](str(path), _text(path))
-        if not found.ids:
+        nodes = MESHES[ending](str(path), _text(path))
+        if not nodes.ids:
             raise SuperElementError(f"{path}: there is no node in it: give the input file that lists them")
-        return found
+        return nodes
     return _table(path)
 
 
@@ -160,22 +160,22 @@ def _table(path: Path) -> Nodes:
     header = [word.strip().lower() for word in rows[0]] if rows else []
     if header[:4] != ["id", "x", "y", "z"] or header[4:] not in ([], ["dofs"]):
         raise SuperElementError(f'{path}, line 1: the header has to be "id,x,y,z" or "id,x,y,z,dofs"')
-    found = Nodes([], [], [])
+    nodes = Nodes([], [], [])
     for number, row in enumerate(rows[1:], 2):
         if not any(word.strip() for word in row):
             continue
         try:
             identity, x, y, z, *dofs = (word.strip() for word in row)
-            found.ids.append(number_of_node(identity))
-            found.position.append([float(word) for word in (x, y, z)])
-            found.dofs.append(dofs[0] if dofs else "123456")
+            nodes.ids.append(number_of_node(identity))
+            nodes.position.append([float(word) for word in (x, y, z)])
+            nodes.dofs.append(dofs[0] if dofs else "123456")
         except ValueError:
             raise SuperElementError(f"{path}, line {number}: give {','.join(header)} as numbers, not {row}") from None
-        if not all(map(usable, found.position[-1])):
+        if not all(map(usable, nodes.position[-1])):
             raise SuperElementError(f"{path}, line {number}: a coordinate is not finite, or beyond {MAGNITUDE:g}")
-    if not found.ids:
+    if not nodes.ids:
         raise SuperElementError(f"{path}: there is no node: add a line for each, under id,x,y,z")
-    return found
+    return nodes
 
 
 def _by_labels(K: NamedMatrix, M: NamedMatrix, table: Nodes) -> tuple[NamedMatrix, NamedMatrix, Nodes]:
@@ -190,7 +190,7 @@ def _by_labels(K: NamedMatrix, M: NamedMatrix, table: Nodes) -> tuple[NamedMatri
         raise SuperElementError(
             f"the matrices have rows of node {strange[0]}, which the table of nodes does not list: add it"
         )
-    dofs = ["".join(str(component) for node, component in rows if node == each) for each in ids]
+    dofs = ["".join(str(component) for node, component in rows if node == number) for number in ids]
     at = {row: i for i, row in enumerate(rows)}
 
     def spread(given: NamedMatrix) -> NamedMatrix:

@@ -19,7 +19,7 @@ class Nodes(NamedTuple):
 
 def grid_nodes(file: str, text: str) -> Nodes:
     """Nodes of the GRID cards, in the basic system. SuperElementError with file, line and remedy."""
-    found = Nodes([], [], [])
+    nodes = Nodes([], [], [])
     for number, fields in cards(text, "GRID"):
         fields = [*fields, *[""] * 7][:7]
         if any(word not in ("", "0", "-1") for word in (fields[2], fields[6])):
@@ -28,10 +28,10 @@ def grid_nodes(file: str, text: str) -> Nodes:
                 "displacements in the basic one (fields 3 and 7 of GRID)"
             )
         try:
-            _add(found, number_of_node(fields[1]), [real(word) if word else 0.0 for word in fields[3:6]])
+            _add(nodes, number_of_node(fields[1]), [real(word) if word else 0.0 for word in fields[3:6]])
         except ValueError:
             raise SuperElementError(f"{file}, line {number}: GRID needs a number and three coordinates") from None
-    return found
+    return nodes
 
 
 def inp_nodes(file: str, text: str) -> Nodes:

@@ -25,7 +25,7 @@ class Form(NamedTuple):
     word: int
 
     def whole(self, data: bytes) -> list[int]:
-        return [int(each) for each in np.frombuffer(data, f"{self.order}i{self.word}")]
+        return [int(number) for number in np.frombuffer(data, f"{self.order}i{self.word}")]
 
 
 def is_binary_op4(data: bytes) -> bool:
@@ -71,9 +71,7 @@ def _records(file: str, data: bytes, form: Form) -> Iterator[tuple[int, bytes]]:
         at = end + 4
 
 
-def _matrix(
-    file: str, records: Iterator[tuple[int, bytes]], form: Form, size: int, kind: int, *, big: bool
-) -> Real:
+def _matrix(file: str, records: Iterator[tuple[int, bytes]], form: Form, size: int, kind: int, *, big: bool) -> Real:
     """The columns that follow a header, up to the one after the last."""
     matrix = np.zeros((size, size))
     for at, record in records:

@@ -204,7 +204,7 @@ def all_modes(element: SuperElement, face: Interface, boundary: Boundary, count:
     """Frequencies (m,) Hz, ascending, and modes (N,m) of the whole structure, at most `count`: with the first node of
     the interface held, or free."""
     T = face.T[:, 6:] if boundary == "clamped-free" else face.T
-    K, M = (np.asarray(T.T @ (T.T @ each).T) for each in (element.K, element.M))
+    K, M = (np.asarray(T.T @ (T.T @ matrix).T) for matrix in (element.K, element.M))
     if boundary == "free-free":
         K, M = _without_rigid(K, M, T.T @ (element.M @ _unit_rigid(element)))
     L = _factor(K, "K lets the structure move without force beyond its six rigid-body motions")

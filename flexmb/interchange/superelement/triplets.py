@@ -49,16 +49,16 @@ def _lines(text: str) -> list[tuple[int, list[str]]]:
 
 def _element(file: str, number: int, words: list[str], width: int) -> list[float]:
     try:
-        found = [float(word.upper().replace("D", "E")) for word in words]
+        numbers = [float(word.upper().replace("D", "E")) for word in words]
         whole = [int(word) for word in words[:-1]]
     except ValueError:
-        found, whole = [], []
-    if len(found) != width or not usable(found[-1]) or not all(0 < each < 2**53 for each in whole):
+        numbers, whole = [], []
+    if len(numbers) != width or not usable(numbers[-1]) or not all(0 < number < 2**53 for number in whole):
         raise SuperElementError(
             f"{file}, line {number}: {' '.join(words):.60} is not {width - 1} numbers from 1 and a value: internal "
             "nodes and other lines cannot be read, write the matrix again"
         )
-    return found
+    return numbers
 
 
 def _by_place(file: str, lines: list[tuple[int, list[str]]], values: Real) -> NamedMatrix:
@@ -113,7 +113,7 @@ def mapping_rows(file: str, text: str) -> list[Row]:
 
 
 def _rows(file: str, lines: list[tuple[int, list[str]]]) -> list[Row]:
-    found: dict[Row, None] = {}
+    rows: dict[Row, None] = {}
     for number, words in lines:
         if words in ([], [""]):
             continue
@@ -122,9 +122,9 @@ def _rows(file: str, lines: list[tuple[int, list[str]]]) -> list[Row]:
             what = f"{' '.join(words):.40} is not a node and one of its displacements"
             raise SuperElementError(f"{file}, line {number}: {what}: give matrices of displacements and rotations")
         row = (int(words[0]), component)
-        if row in found:
+        if row in rows:
             raise SuperElementError(f"{file}, line {number}: node {row[0]} has displacement {component} twice")
-        found[row] = None
-        if len(found) > LARGEST:
-            refuse_large(file, len(found), len(found))
-    return list(found)
+        rows[row] = None
+        if len(rows) > LARGEST:
+            refuse_large(file, len(rows), len(rows))
+    return list(rows)

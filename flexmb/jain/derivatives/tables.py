@@ -253,11 +253,11 @@ def _shape(c: Constants, place: Index, nq: int) -> Index:
 
 def ports_in_use(c: Constants) -> Flags:
     """(P,) which ports a body, wheel, load or connector is attached to."""
-    found = np.zeros(len(c.port), bool)
+    used = np.zeros(len(c.port), bool)
     ends = c.end["port"][c.end["body"] != ON_GROUND]
     for attached in (c.body["inboard_port"], c.wheel["port"], c.load["port"], ends):
-        found[attached[attached >= 0]] = True
-    return found
+        used[attached[attached >= 0]] = True
+    return used
 
 
 def _ports(c: Constants) -> Record:

@@ -61,7 +61,7 @@ def _problems(scene: Scene, t_end: float | None, t_start: float) -> list[Defect]
     problems = [*_run_time(t_end, t_start)]
     problems += [problem for check in (numbers, *STRUCTURE, *PHYSICS) for problem in check(scene)]
     problems += functions(scene, t_end, t_start)
-    if all(isinstance(each, Doubt) for each in problems):  # it needs valid numbers and names, and a tree
+    if all(isinstance(problem, Doubt) for problem in problems):  # it needs valid numbers and names, and a tree
         problems += [*moved_inertia(scene), *jumps(scene)]
     return problems
 

@@ -73,7 +73,7 @@ def _one_sided(place: Place, connector: s.SpringDamper) -> Iterator[Defect]:
     if connector.acts == "both":
         return
     if connector.table_m or connector.stiffening or connector.stiffness_N_m <= 0.0:
-        what = f'a spring that acts in {connector.acts} only has a constant, positive stiffness'
+        what = f"a spring that acts in {connector.acts} only has a constant, positive stiffness"
         remedy = "write other one-sided laws as a table with loads of zero where the spring is slack"
         yield Defect(str(place.key("acts")), what, remedy)
 
@@ -141,7 +141,7 @@ def friction_peak(sliding: float, static: float, stribeck: float, smoothing: flo
     """
     r = (smoothing / stribeck) ** 2
     roots = np.roots([r * sliding - 2.0 * (static - sliding), r * (3.0 * sliding - static), r * static])
-    found = [(inf, sliding)]
+    extremes = [(inf, sliding)]
     for x in roots[np.isreal(roots) & (roots.real > 0.0)].real.tolist():
-        found.append((stribeck * sqrt(x), (sliding + (static - sliding) / (1.0 + x)) * sqrt(x / (x + r))))
-    return max(found, key=itemgetter(1))
+        extremes.append((stribeck * sqrt(x), (sliding + (static - sliding) / (1.0 + x)) * sqrt(x / (x + r))))
+    return max(extremes, key=itemgetter(1))

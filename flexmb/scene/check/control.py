@@ -27,8 +27,8 @@ class Named(NamedTuple):
 
 def named(reference: str) -> Named | None:
     """A reference such as "gyro" or "gyro[2]" in its parts; None if it is neither."""
-    found = REFERENCE.fullmatch(reference)
-    return None if found is None else Named(found["name"], None if found["number"] is None else int(found["number"]))
+    match = REFERENCE.fullmatch(reference)
+    return None if match is None else Named(match["name"], None if match["number"] is None else int(match["number"]))
 
 
 def sensor_width(scene: s.Scene, sensor: s.Sensor) -> int | None:
@@ -102,10 +102,10 @@ def widths_of(scene: s.Scene) -> dict[str, int | None]:
 def one_number(place: Place, reference: str, widths: dict[str, int | None]) -> Iterator[Defect]:
     """A reference is known, and to one number."""
     yield from _reference(place, reference, widths, set())
-    found = named(reference)
-    width = None if found is None or found.number is not None else widths.get(found.name)
-    if found is not None and width is not None and width != 1:
-        yield Defect(str(place), f'"{found.name}" has {width} numbers', f'say which: "{found.name}[0]"')
+    names = named(reference)
+    width = None if names is None or names.number is not None else widths.get(names.name)
+    if names is not None and width is not None and width != 1:
+        yield Defect(str(place), f'"{names.name}" has {width} numbers', f'say which: "{names.name}[0]"')
 
 
 def control(scene: s.Scene) -> Iterator[Defect]:
@@ -125,14 +125,14 @@ def control(scene: s.Scene) -> Iterator[Defect]:
         yield from _sizes(place, controller, inputs)
         yield from _at_once(place, controller, immediate, widths)
         widths[controller.name] = output_width(controller, inputs)
-    yield from _signals(scene, {each.name: widths[each.name] for each in scene.controllers})
+    yield from _signals(scene, {controller.name: widths[controller.name] for controller in scene.controllers})
 
 
 def _sensors(scene: s.Scene) -> Iterator[Defect]:
     moving = [item.name for key in ("hinges", "wheels", "point_masses") for item in getattr(scene, key)]
     moving += [f"{body.name}.modes" for body in scene.bodies if isinstance(body, s.BeamBody | s.ModalBody)]
     markers = [marker.name for marker in scene.markers]
-    loaded = [each.name for each in (*scene.hinges, *scene.constraints)]
+    loaded = [item.name for item in (*scene.hinges, *scene.constraints)]
     known: dict[Any, tuple[tuple[str, ...], str, list[str]]] = {
         s.CoordinateSensor: (("of",), "hinge, wheel, point mass or modes", moving),
         s.MarkerSensor: (("marker",), "marker", markers),
@@ -153,29 +153,29 @@ def _sensors(scene: s.Scene) -> Iterator[Defect]:
 
 
 def _width(reference: str, widths: dict[str, int | None]) -> int | None:
-    found = named(reference)
-    if found is None or found.name not in widths:
+    names = named(reference)
+    if names is None or names.name not in widths:
         return None
-    return widths[found.name] if found.number is None else 1
+    return widths[names.name] if names.number is None else 1
 
 
 def _reference(place: Place, reference: str, widths: dict[str, int | None], later: set[str]) -> Iterator[Defect]:
     """A referenced signal exists, is computed before, and has a number of this index."""
-    found = named(reference)
-    if found is None:
+    names = named(reference)
+    if names is None:
         yield Defect(str(place), f'"{reference}" is no signal', 'write "name", or "name[0]" for one of its numbers')
-    elif found.name not in widths:
-        what = f'there is no sensor or controller "{found.name}"'
-        if found.name in later:
-            what, remedy = f'controller "{found.name}" is listed later', "list a controller before those that read it"
+    elif names.name not in widths:
+        what = f'there is no sensor or controller "{names.name}"'
+        if names.name in later:
+            what, remedy = f'controller "{names.name}" is listed later', "list a controller before those that read it"
         else:
-            remedy = closest(found.name, widths)
+            remedy = closest(names.name, widths)
         yield Defect(str(place), what, remedy)
     else:
-        width = widths[found.name]
-        if found.number is not None and width is not None and found.number >= width:
+        width = widths[names.name]
+        if names.number is not None and width is not None and names.number >= width:
             remedy = f"its numbers are 0 to {width - 1}"
-            yield Defect(str(place), f'"{found.name}" has no number {found.number}', remedy)
+            yield Defect(str(place), f'"{names.name}" has no number {names.number}', remedy)
 
 
 def _instants(place: Place, controller: s.Controller) -> Iterator[Defect]:
@@ -272,11 +272,10 @@ def _signals(scene: s.Scene, widths: dict[str, int | None]) -> Iterator[Defect]:
         if not isinstance(value, s.ControlSignal) or key == "function" and place.path.startswith("$.sensors"):
             continue
         yield from _reference(place.key("source"), value.source, widths, set())
-        found = named(value.source)
-        if found is not None and found.number is None and (widths.get(found.name) or 1) > 1:
-            what = f'controller "{found.name}" has {widths[found.name]} outputs'
-            yield Defect(str(place.key("source")), what, f'say which: "{found.name}[0]"')
+        names = named(value.source)
+        if names is not None and names.number is None and (widths.get(names.name) or 1) > 1:
+            what = f'controller "{names.name}" has {widths[names.name]} outputs'
+            yield Defect(str(place.key("source")), what, f'say which: "{names.name}[0]"')
         if key in MOTIONS:
             remedy = "give it as torque_Nm or force_N"
             yield Defect(str(place), "a controller cannot prescribe a motion", remedy)
-

@@ -26,15 +26,15 @@ def couplings(scene: Scene) -> Iterator[Defect]:
             yield Defect(str(place), str(error), NAME_IT)
             continue
         yield from _once(place, related)
-        if all(each.named.coordinate.prescribed is not None for each in related):
+        if all(member.named.coordinate.prescribed is not None for member in related):
             what = "all its coordinates are prescribed, and nothing is left that it could lead"
             yield Defect(str(place), what, "leave the coupling out, or one of the prescribed motions")
 
 
 def _once(place: Place, related: tuple[Coupled, ...]) -> Iterator[Defect]:
     seen: set[tuple[str, int]] = set()
-    for each in related:
-        if (each.hinge.name, each.place) in seen:
-            what = f'coordinate "{each.named.name}" of hinge "{each.hinge.name}" is named twice'
+    for member in related:
+        if (member.hinge.name, member.place) in seen:
+            what = f'coordinate "{member.named.name}" of hinge "{member.hinge.name}" is named twice'
             yield Defect(str(place), what, "name each coordinate once, with the sum of its ratios")
-        seen.add((each.hinge.name, each.place))
+        seen.add((member.hinge.name, member.place))

@@ -53,12 +53,10 @@ def _names_of_stops(scene: Scene) -> Iterator[Defect]:
                 yield Defect(str(place.key("name")), what, "rename one of the two")
 
 
-def _signal(
-    place: Place, reference: str, signals: dict[str, int | None], others: dict[str, str]
-) -> Iterator[Defect]:
+def _signal(place: Place, reference: str, signals: dict[str, int | None], others: dict[str, str]) -> Iterator[Defect]:
     """A reference to anything but time, coordinates and rates is to one number of a sensor or controller."""
-    found = named(reference)
-    if found is None or found.name not in signals:
+    names = named(reference)
+    if names is None or names.name not in signals:
         yield Defect(str(place), f'there is no "{reference}"', closest(reference, {**others, **signals}))
     else:
         yield from one_number(place, reference, signals)

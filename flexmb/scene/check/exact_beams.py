@@ -45,29 +45,31 @@ def exact_beam(place: Place, body: BeamBody) -> Iterator[Defect]:
         remedy = "correct the curvature (1/m), or divide the beam into several that are welded together"
         yield Defect(str(place.key("stations", worst, "curvature_1_m")), what, remedy)
     if body.modes.boundary != "clamped-free":
-        remedy = 'leave it out: the body frame is at the root, and a hinge may sit on any node of the beam'
+        remedy = "leave it out: the body frame is at the root, and a hinge may sit on any node of the beam"
         yield Defect(str(modes.key("boundary")), "strains have no boundary conditions to choose", remedy)
     if body.mass != "consistent":
         yield Defect(str(place.key("mass")), f'mass is "{body.mass}"', 'use "consistent": inertia is at Gauss points')
-    if wrong or not all(in_range(each) for each in (body.modes, body.modes.polynomials) if each is not None):
+    if wrong or not all(in_range(mapping) for mapping in (body.modes, body.modes.polynomials) if mapping is not None):
         return  # nothing can be said of so many
-    found = polynomials(body)
-    if not found:
+    counts = polynomials(body)
+    if not counts:
         remedy = 'give polynomials of a curvature, or make the level "rigid"'
         yield Defect(str(modes.key("count")), "the beam has no strain", remedy)
         return
-    if body.modes.points is not None and (points := body.modes.points) <= (most := max(found.values())):
+    if body.modes.points is not None and (points := body.modes.points) <= (most := max(counts.values())):
         what = f"{points} points for {most} polynomials of one strain leave motions without inertia"
         remedy = f"use {most + 1} points at least; {max(FEWEST_POINTS, most + MORE_POINTS)} are the default"
         yield Defect(str(modes.key("points")), what, remedy)
     elif turn <= MOST_TURN:
-        yield from _unfollowed(modes, body, found)
+        yield from _unfollowed(modes, body, counts)
     for shear, key in (("shear_y", "GAy_N"), ("shear_z", "GAz_N")):
-        if shear in found and any(each.stiffness is None and getattr(each, key) is None for each in body.stations):
+        if shear in counts and any(
+            station.stiffness is None and getattr(station, key) is None for station in body.stations
+        ):
             spot = str(place.key("stations"))
             yield Defect(spot, f"{shear} has polynomials, and a station no {key}", f"give {key} at every station")
-    yield from _still(modes, body, found)
-    if (count := sum(found.values()) * max(piece_count(body), 1)) > MOST_MODES:
+    yield from _still(modes, body, counts)
+    if (count := sum(counts.values()) * max(piece_count(body), 1)) > MOST_MODES:
         numbers = f"{counted(count)} polynomials in all its pieces"
         what = f"{numbers}: one body with so many takes minutes and gigabytes to make"
         remedy = f"give {MOST_MODES} at most; several bodies that are welded together cost O(N)"

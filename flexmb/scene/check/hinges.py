@@ -31,22 +31,23 @@ def hinges(scene: Scene) -> Iterator[Defect]:
 
 def _to_examine(scene: Scene) -> set[int]:
     """Numbers of the gimbals, and of hinges with a prescribed motion."""
-    found: set[int] = set()
+    bodies: set[int] = set()
     for kind, owners, structs in alike(scene.hinges):
         if kind is Gimbal:
-            found.update(owners)
+            bodies.update(owners)
         for key in kind.__struct_fields__:
             if key in MOTIONS and any(profiles := list(map(attrgetter(key), structs))):
-                found.update(owner for owner, profile in zip(owners, profiles, strict=True) if profile is not None)
-    return found
+                bodies.update(owner for owner, profile in zip(owners, profiles, strict=True) if profile is not None)
+    return bodies
 
 
 def closures(scene: Scene) -> Iterator[Defect]:
     """A closure of a kind without an axis must not be given one."""
     given = [
         i
-        for i, each in enumerate(scene.closures)
-        if each.type not in WITH_AXIS and max(abs(a - b) for a, b in zip(each.axis, Z_AXIS, strict=True)) > UNIT_LENGTH
+        for i, closure in enumerate(scene.closures)
+        if closure.type not in WITH_AXIS
+        and max(abs(a - b) for a, b in zip(closure.axis, Z_AXIS, strict=True)) > UNIT_LENGTH
     ]
     for place, closure in sound(scene, "closures", given):
         what = f"a {closure.type} closure has no axis of its own"

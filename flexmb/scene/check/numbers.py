@@ -56,15 +56,15 @@ def _compiled(kind: type[msgspec.Struct]) -> _Compiled | None:
 
 def outside(items: Sequence[Any]) -> set[int]:
     """Numbers of the items that have, in themselves or in structs inside them, a number that is to be looked at."""
-    found: set[int] = set()
+    wrong: set[int] = set()
     for group in alike(items):
         compiled = _compiled(group.kind)
         if compiled is not None:
             if compiled.least.size:
-                found.update(group.owners[i] for i in _single(compiled, group))
+                wrong.update(group.owners[i] for i in _single(compiled, group))
             for key in compiled.others:
-                found.update(_off_unit(group, key.name) if key.unit_length else _nested(group, key))
-    return found
+                wrong.update(_off_unit(group, key.name) if key.unit_length else _nested(group, key))
+    return wrong
 
 
 def _single(compiled: _Compiled, group: Alike) -> Iterator[int]:

@@ -233,8 +233,8 @@ def _lumps(mass: Real, com: Real, inertia: Real) -> Real:
 
 def _lump(mass: float, com: Vector | Real, inertia: ArrayLike) -> Real:
     """Spatial inertia (6,6) of one lump."""
-    found: Real = _lumps(np.array([mass]), np.array([com], float), np.array([inertia], float))[0]
-    return found
+    lump: Real = _lumps(np.array([mass]), np.array([com], float), np.array([inertia], float))[0]
+    return lump
 
 
 def _motions(R: Real, p: Real) -> Real:
@@ -270,27 +270,27 @@ def _free_directions(freedoms: Sequence[tuple[Freedom, ...]]) -> list[Real]:
 
 def _armatures(freedoms: Sequence[Freedom]) -> list[float]:
     """Armatures of the freedoms of one hinge, by the rows of `_free_directions`."""
-    found: list[float] = []
+    armatures: list[float] = []
     for freedom in freedoms:
         match freedom:
             case ScalarFreedom(coordinate=coordinate):
-                found += [coordinate.armature] if coordinate.prescribed is None else []
+                armatures += [coordinate.armature] if coordinate.prescribed is None else []
             case Ball() | Floating():
-                found += [0.0] * freedom.sizes[1]
+                armatures += [0.0] * freedom.sizes[1]
             case _:
                 assert_never(freedom)
-    return found
+    return armatures
 
 
 def _directions_of(freedoms: Sequence[Freedom]) -> Real:
     """Free rows of several freedoms; each is transformed to the outboard frame by the freedoms that follow it."""
-    found = [np.zeros((0, 6))]
+    directions = [np.zeros((0, 6))]
     R, p = np.eye(3), np.zeros(3)  # of the outboard frame, seen from where the freedom leads
     for freedom in reversed(freedoms):
         own, turned, moved = _across(freedom)
-        found.append(own @ _motions(R[None], p[None])[0].T)
+        directions.append(own @ _motions(R[None], p[None])[0].T)
         R, p = turned @ R, moved + turned @ p
-    return np.concatenate(found[::-1])
+    return np.concatenate(directions[::-1])
 
 
 def _across(freedom: Freedom) -> tuple[Real, Real, Real]:

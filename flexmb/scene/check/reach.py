@@ -18,7 +18,7 @@ def reach(scene: Scene) -> float:
 
     Where bodies are, an orbit for instance, does not count: no inertia is computed from that.
     """
-    return max((float(np.max(np.linalg.norm(each, axis=1), initial=0.0)) for each in _arms(scene)), default=0.0)
+    return max((float(np.max(np.linalg.norm(arm, axis=1), initial=0.0)) for arm in _arms(scene)), default=0.0)
 
 
 def _arms(scene: Scene) -> Iterator[Real]:

@@ -53,4 +53,4 @@ def _points(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Defe
 
 
 def _largest(*shapes: ArrayLike) -> float:
-    return max(float(np.max(np.abs(each), initial=0.0)) for each in shapes)
+    return max(float(np.max(np.abs(shape), initial=0.0)) for shape in shapes)

@@ -43,11 +43,11 @@ def stations(place: Place, body: BeamBody) -> Iterator[Defect]:
     sound = 0
     for i, station in enumerate(body.stations):
         spot = place.key("stations", i)
-        found = [*_complete(spot, station, body.theory == "timoshenko")]
-        if not found:
-            found = [*_matrices(spot, station, body)]
-        yield from found
-        if not found and in_range(station):
+        stations = [*_complete(spot, station, body.theory == "timoshenko")]
+        if not stations:
+            stations = [*_matrices(spot, station, body)]
+        yield from stations
+        if not stations and in_range(station):
             yield from _plausible(spot, station, body.length_m)
             sound += 1
             if body.level != "exact" and body.length_m > 0.0 and not is_plain(station):
@@ -83,11 +83,11 @@ def _matrices(spot: Place, station: BeamStation, body: BeamBody) -> Iterator[Def
 
 def _symmetric(place: Place, values: Matrix6) -> Iterator[Defect]:
     """A matrix is symmetric to what ten printed digits of its elements leave, relative to its diagonal."""
-    found = np.array(values)
-    gap = np.abs(found - found.T) - PRINTED * np.sqrt(np.abs(np.outer(np.diag(found), np.diag(found))))
+    matrix = np.array(values)
+    gap = np.abs(matrix - matrix.T) - PRINTED * np.sqrt(np.abs(np.outer(np.diag(matrix), np.diag(matrix))))
     i, j = np.unravel_index(int(np.argmax(gap)), gap.shape)
     if gap[i, j] > 0.0:
-        what = f"the matrix is not symmetric: [{i}][{j}] is {found[i, j]:g}, [{j}][{i}] is {found[j, i]:g}"
+        what = f"the matrix is not symmetric: [{i}][{j}] is {matrix[i, j]:g}, [{j}][{i}] is {matrix[j, i]:g}"
         yield Defect(str(place), what, "give the same value on both sides of the diagonal")
 
 

@@ -49,15 +49,15 @@ class StateDirections:
     @kept
     def along(self) -> Real:
         """(n,D) change of y along all directions."""
-        found = np.zeros((self.entries, self.size))
-        found[:, self.state] = np.eye(self.entries)
-        return found
+        directions = np.zeros((self.entries, self.size))
+        directions[:, self.state] = np.eye(self.entries)
+        return directions
 
     def held(self, name: str) -> Real:
         """(D,) change of the value at which a coordinate is held."""
-        found = np.zeros(self.size)
-        found[self.parameters + self.slots.index(name)] = 1.0
-        return found
+        values = np.zeros(self.size)
+        values[self.parameters + self.slots.index(name)] = 1.0
+        return values
 
 
 @dataclass
@@ -117,7 +117,7 @@ class _Sweep:
         """Pass the steps of the part."""
         part, places = self._part, self._part.places
         power = places.memory - 1
-        of_power = self.gradient[power] != 0.0 or any(each[power] != 0.0 for each in part.added.values())
+        of_power = self.gradient[power] != 0.0 or any(rates[power] != 0.0 for rates in part.added.values())
         functions = wired(part.blocks.system).drive["function"].tolist() if part.instants else []
         self._transposes = Transposes(part.blocks, places.lanes, functions, of_power)
         state = arc.backwards(self.gradient[places.state], self._transposes, self)

@@ -66,8 +66,8 @@ class SampledLoop:
         begun = int(tables[0].following[0])
         self._variation.take(at)
         self._set_lanes()
-        for each in tables:
-            self._loops.blocks.check(variation.steer(t, each))
+        for table in tables:
+            self._loops.blocks.check(variation.steer(t, table))
         due = schedule[begun : int(tables[0].following[0])]
         rows, applied = dict[int, Real](), list[tuple[int, slice]]()
         for row in due:
@@ -89,21 +89,21 @@ class SampledLoop:
     def _driven(self) -> tuple[Real, Real]:
         """Derivatives (F,D) and values (F,) of what controllers drive."""
         tables = self._loops.tables
-        drive, gains = tables[0].drive, self._loops.blocks.joined([each.drive["gain"] for each in tables])
+        drive, gains = tables[0].drive, self._loops.blocks.joined([table.drive["gain"] for table in tables])
         gain, signal = drive["gain"][:, 0], tables[0].signal[drive["signal"], 0]
         return gain[:, None] * self._along[drive["signal"]] + signal[:, None] * gains, gain * signal
 
     def _joined(self, name: str, row: int | None = None) -> Real:
-        arrays = [getattr(each, name) for each in self._loops.tables]
-        return self._loops.blocks.joined([each if row is None else each[row] for each in arrays])
+        arrays = [getattr(table, name) for table in self._loops.tables]
+        return self._loops.blocks.joined([array if row is None else array[row] for array in arrays])
 
     def _set_lanes(self) -> None:
         """Signals and states change along their own directions, and outputs that wait along none."""
-        for b, each in enumerate(self._loops.tables):
+        for b, tables in enumerate(self._loops.tables):
             own = self._along[:, LANES * b : LANES * (b + 1)]
-            each.signal[:, 1 : 1 + own.shape[1]] = own[: self._signals]
-            each.state[:, 1 : 1 + own.shape[1]] = own[self._signals :]
-            each.held[self._waiting, :, 1:] = 0.0
+            tables.signal[:, 1 : 1 + own.shape[1]] = own[: self._signals]
+            tables.state[:, 1 : 1 + own.shape[1]] = own[self._signals :]
+            tables.held[self._waiting, :, 1:] = 0.0
 
 
 class DrivenFunctions(NamedTuple):
@@ -114,8 +114,8 @@ class DrivenFunctions(NamedTuple):
 
     def hold(self, values: Real) -> None:
         """Set their values (F,)."""
-        for each in self.constants:
-            hold(each, self.functions, values)
+        for constant in self.constants:
+            hold(constant, self.functions, values)
 
 
 @kernel

@@ -42,7 +42,7 @@ class Transposes:
         c, by_recursion = plant.constants, not of_power and plant.closures is None
         self._chains: list[Any] = []
         self._x = pull_workspace(c, plant.nq, plant.nu) if by_recursion else None
-        acts = [_acting(each, c, by_recursion, functions) for each in blocks.duals[: -(-count // LANES)]]
+        acts = [_acting(dual, c, by_recursion, functions) for dual in blocks.duals[: -(-count // LANES)]]
         self._chosen = np.flatnonzero(np.concatenate(acts)[:count])
         self._driven = len(functions)
         lanes = len(self._chosen) + self._driven
@@ -50,7 +50,7 @@ class Transposes:
         table = self._lanes_table(plant)
         self._gradient = table.gradient
         self.unproject, self.transpose = transposed.unproject, transposed.pull_back
-        of_lanes = [] if self._lanes is None else [each.constants for each in self._lanes.duals]
+        of_lanes = [] if self._lanes is None else [dual.constants for dual in self._lanes.duals]
         if self._x is not None:
             self.tables: Any = transposed.ByRecursion(c, self._x, table)
             self.held = DrivenFunctions(np.array(functions, np.int64), [c, *of_lanes])
@@ -83,36 +83,36 @@ class Transposes:
     def by_driven(self) -> Real:
         """(F,) by what controllers drive, since the last call."""
         place = slice(len(self._chosen), len(self._chosen) + self._driven)
-        found = self._gradient[place].copy()
+        rates = self._gradient[place].copy()
         self._gradient[place] = 0.0
-        return found
+        return rates
 
     def by_parameters(self) -> Real:
         """The gradient (count,) by the first directions that the steps passed so far have left."""
-        found = np.zeros(self._count)
-        found[self._chosen] = self._gradient[: len(self._chosen)]
+        rates = np.zeros(self._count)
+        rates[self._chosen] = self._gradient[: len(self._chosen)]
         if self._x is not None:
             p, c = self._x.p, self._blocks.system.constants
-            for b, each in enumerate(self._blocks.duals[: -(-self._count // LANES)]):
-                own = by_constants(p, c, each.constants)
+            for b, dual in enumerate(self._blocks.duals[: -(-self._count // LANES)]):
+                own = by_constants(p, c, dual.constants)
                 count = min(LANES, self._count - LANES * b)
                 chosen = np.isin(np.arange(LANES * b, LANES * b + count), self._chosen)
-                found[LANES * b : LANES * b + count] += np.where(chosen, 0.0, own[:count])
-        return found
+                rates[LANES * b : LANES * b + count] += np.where(chosen, 0.0, own[:count])
+        return rates
 
 
 def by_constants(p: Any, c: Constants, duals: DualConstants) -> Real:
     """(LANES,) by the parameters of a block, from the derivatives by the constants that `Pulled` has."""
-    found = np.einsum("ki,kil->l", p.rigid, duals.body["rigid"][..., 1:])
-    found = found + np.einsum("ki,kil->l", p.placement[:, :3], duals.body["placement_position"][..., 1:])
+    rates = np.einsum("ki,kil->l", p.rigid, duals.body["rigid"][..., 1:])
+    rates = rates + np.einsum("ki,kil->l", p.placement[:, :3], duals.body["placement_position"][..., 1:])
     R = c.body["placement_rotation"].reshape(-1, 3, 3)
     dR = duals.body["placement_rotation"][..., 1:].reshape(len(R), 3, 3, LANES)
     turn = np.einsum("kijl,kmj->kiml", dR, R)  # of the axes against themselves: a skew matrix
     turn = np.stack([turn[:, 2, 1], turn[:, 0, 2], turn[:, 1, 0]], axis=1)
-    found = found + np.einsum("ki,kil->l", p.placement[:, 3:], turn)
+    rates = rates + np.einsum("ki,kil->l", p.placement[:, 3:], turn)
     for name, column in _SPRING.items():
-        found = found + p.spring[:, column] @ duals.speed[name][..., 1:]
-    return np.asarray(found + p.gravity @ duals.gravity[..., 1:])
+        rates = rates + p.spring[:, column] @ duals.speed[name][..., 1:]
+    return np.asarray(rates + p.gravity @ duals.gravity[..., 1:])
 
 
 def _acting(duals: DualTables, c: Constants, by_recursion: bool, driven: Sequence[int]) -> Flags:
@@ -129,7 +129,7 @@ def _acting(duals: DualTables, c: Constants, by_recursion: bool, driven: Sequenc
         known |= {("body", f"placement_{name}"): on_ports for name in ("position", "rotation")}
         known |= {("speed", "armature"): False, ("port", None): ports_in_use(c)}
         known |= {("speed", name): False for name in ("stiffness", "damping", "rest")} if simple else {}
-    found = np.zeros(LANES, bool)
+    lanes = np.zeros(LANES, bool)
     for table in (duals.constants, duals.closures):
         for name, field, part in dual_parts(table) if table is not None else ():
             rates = part[..., 1:] != 0.0
@@ -138,14 +138,14 @@ def _acting(duals: DualTables, c: Constants, by_recursion: bool, driven: Sequenc
                 continue
             if kept is not True:
                 rates = rates[kept]
-            found |= np.any(rates.reshape(-1, LANES), axis=0)
-    return found
+            lanes |= np.any(rates.reshape(-1, LANES), axis=0)
+    return lanes
 
 
 def _gathered(blocks: Blocks, chosen: Index, functions: Sequence[int]) -> list[DualTables]:
     """Blocks of the chosen directions, then of the values of functions of time."""
-    found, sources = list[DualTables](), [each.constants for each in blocks.duals]
-    closures = [each.closures for each in blocks.duals if each.closures is not None]
+    found, sources = list[DualTables](), [dual.constants for dual in blocks.duals]
+    closures = [dual.closures for dual in blocks.duals if dual.closures is not None]
     count = len(chosen) + len(functions)
     for first in range(0, count, LANES):
         arrays = _lanes_of(sources, chosen[first : first + LANES])
@@ -156,21 +156,21 @@ def _gathered(blocks: Blocks, chosen: Index, functions: Sequence[int]) -> list[D
         of_closures = _lanes_of(closures, chosen[first : first + LANES]) if closures else None
         own = None if of_closures is None else DualClosureConstants(**of_closures)
         found.append(DualTables(DualConstants(**arrays), own))
-    broaden([each.constants for each in found])
-    broaden([each.closures for each in found if each.closures is not None])
+    broaden([dual.constants for dual in found])
+    broaden([dual.closures for dual in found if dual.closures is not None])
     return found
 
 
 def _lanes_of(tables: Sequence[Any], chosen: Index) -> dict[str, Any]:
     """The arrays of a table in duals with the lanes of the chosen directions."""
-    found = {}
-    for each in fields(tables[0]):
-        arrays = [getattr(table, each.name) for table in tables]
+    lanes = {}
+    for field in fields(tables[0]):
+        arrays = [getattr(table, field.name) for table in tables]
         wide = arrays[0].copy()
         sources = [[part for _, part in array_parts(array)] for array in arrays]
         for i, (_, part) in enumerate(array_parts(wide)):
             part[..., 1:] = 0.0
             for lane, k in enumerate(chosen):
                 part[..., 1 + lane] = sources[k // LANES][i][..., 1 + k % LANES]
-        found[each.name] = wide
-    return found
+        lanes[field.name] = wide
+    return lanes

@@ -62,7 +62,7 @@ class Adjoint:
             made = None if solve.feedback is None else solve.feedback.running
             memory = 0 if made is None else len(made.signal) + len(made.state)
         self._places = StateDirections(
-            len(self._numbers), tuple(dict.fromkeys(each.coordinate for each in latches)), len(y), memory
+            len(self._numbers), tuple(dict.fromkeys(latch.coordinate for latch in latches)), len(y), memory
         )
         gradient, rows = np.zeros(self._places.size), dict[int, Real]()
         for part in reversed(self._forwards(course)):
@@ -90,7 +90,7 @@ class Adjoint:
                 variation = Variation(leg, blocks, loops)
                 sampling = None if loops is None else SampledLoop(variation, loops, places.memory, places.size)
                 at = passage.begun(variation, y)
-                own = {t: each for t, each in probes.items() if start <= t and (t < stop or is_last)}
+                own = {t: probe for t, probe in probes.items() if start <= t and (t < stop or is_last)}
                 due = [] if sampling is None else sampling.times(start, stop, is_last)
                 ends = sorted({start, *own, *due, stop})
                 plain = Plain(blocks.system)
@@ -156,19 +156,19 @@ class Adjoint:
 
     def _probes(self, t_end: float, cuts: Sequence[float]) -> dict[float, list[Probe]]:
         """The instants of all terms, by time."""
-        found = dict[float, list[Probe]]()
+        probes = dict[float, list[Probe]]()
         for term in self._terms:
             for probe in term.probes(t_end, cuts):
-                found.setdefault(probe.t, []).append(probe)
-        return found
+                probes.setdefault(probe.t, []).append(probe)
+        return probes
 
     def _added(self, seeing: Seeing, t: float, y: Real, probes: Sequence[Probe]) -> Real:
         """The gradient (D,) that the scalar adds at one instant; its value there is added to `value`."""
         values, rates = seeing.at(t, y)
         total = np.zeros(self._places.size)
-        for each in probes:
-            self.value += each.value(values[each.channel])
-            total += each.slope(values[each.channel]) * rates[each.channel]
+        for probe in probes:
+            self.value += probe.value(values[probe.channel])
+            total += probe.slope(values[probe.channel]) * rates[probe.channel]
         return total
 
     def _integrands(self, seeing: Seeing, t: float, y: Real) -> list[float]:

@@ -89,7 +89,7 @@ def _from_python(bodies: int) -> Measured:
     system = fm.compile(scene)
     q, u, evaluate = system.initial_state.q, system.initial_state.u, system.derivative_evaluator()
     results = evaluate.by_displacement, evaluate.by_speed, evaluate.by_force
-    native = Call(lambda: evaluate(0.0, q, u), 1, lambda: np.concatenate([each.ravel() for each in results]))
+    native = Call(lambda: evaluate(0.0, q, u), 1, lambda: np.concatenate([result.ravel() for result in results]))
     return how_many_times(native, peers.pinocchio_derivatives(scene, np.zeros(bodies)), TO_ROUNDING)
 
 

@@ -220,9 +220,7 @@ def _meshed(scene: fm.Scene, elements: int) -> Any:
     return assemble_beam(replace(scene, bodies=(replace(scene.bodies[0], elements=elements),)), elements)
 
 
-def _elements(
-    beam: Any, times: np.ndarray, error: Callable[[np.ndarray], float], level: float
-) -> Iterator[Setting]:
+def _elements(beam: Any, times: np.ndarray, error: Callable[[np.ndarray], float], level: float) -> Iterator[Setting]:
     """Steps by halves until one errs by `level`, and with that one all settings of Newton's method."""
     places = np.array([0.0, 0.5, 1.0]) * beam.scene.bodies[0].length_m
 
@@ -238,5 +236,5 @@ def _elements(
             first = setting(method, USUAL_NEWTON, step)
             yield first
             if first.error <= level:
-                yield from (setting(method, Newton(*each), step) for each in NEWTONS)
+                yield from (setting(method, Newton(*newton), step) for newton in NEWTONS)
                 break

@@ -51,8 +51,8 @@ def rigid_tree(tree: str, bodies: int) -> Scene:
 
 def _growth(tree: str, few: int, many: int) -> Measured:
     calls = [_once(rigid_tree(tree, bodies)) for bodies in (few, many)]
-    seconds = turns(*(each.call for each in calls))
-    seconds /= [each.samples * bodies for each, bodies in zip(calls, (few, many), strict=True)]
+    seconds = turns(*(call.call for call in calls))
+    seconds /= [call.samples * bodies for call, bodies in zip(calls, (few, many), strict=True)]
     short, long = np.median(seconds, axis=0)
     return measured(seconds[:, 1] / seconds[:, 0], f"{duration(long)} against {duration(short)} a body")
 

@@ -59,11 +59,11 @@ def append(results: Results, file: Path = FILE) -> list[Point]:
     known = read_history(file)
     kept = [
         Point(
-            each.date, each.commit, each.name, each.measured.value, each.measured.low, each.measured.high,
-            each.machine.partition(";")[0],
+            row.date, row.commit, row.name, row.measured.value, row.measured.low, row.measured.high,
+            row.machine.partition(";")[0],
         )
-        for each in results.rows.values()
-        if each.measured is not None
+        for row in results.rows.values()
+        if row.measured is not None
     ]  # fmt: skip
     new = sorted(set(kept) - set(known), key=lambda point: (point.date, point.commit, point.row))
     with file.open("ab") as lines:

@@ -147,6 +147,6 @@ def _machines(results: Results) -> str:
     kept = sorted(results.rows.values(), key=lambda each: (each.machine, each.date, each.commit, each.name))
     lines = ["## Where and when", ""]
     for (machine, date, commit), rows in groupby(kept, key=lambda each: (each.machine, each.date, each.commit)):
-        names = _names([each.name for each in rows])
+        names = _names([row.name for row in rows])
         lines += [f"- {date}, commit {commit}, {machine}: {names}."]
     return "\n".join(lines) + "\n"

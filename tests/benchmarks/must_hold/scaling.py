@@ -83,8 +83,8 @@ def measured_curves(picture: Picture) -> Scaling:
     found: dict[str, dict[int, float]] = {}
     for number in picture.numbers:
         calls = dict(picture.calls(number))
-        samples = [each.samples for each in calls.values()]
-        seconds = np.median(turns(*(each.call for each in calls.values()), rounds=ROUNDS), axis=0) / samples
+        samples = [call.samples for call in calls.values()]
+        seconds = np.median(turns(*(call.call for call in calls.values()), rounds=ROUNDS), axis=0) / samples
         for label, value in zip(calls, seconds.tolist(), strict=True):
             found.setdefault(label, {})[number] = 1e6 * value
     curves = [Curve(label, list(points), list(points.values())) for label, points in found.items()]

@@ -166,7 +166,7 @@ NOISE = 1e-4  # m
 def _fit(make: Callable[[], Problem]) -> Measured:
     """Both from the same start, to the same measurements, by runs of the same accuracy."""
     scene, by, of, t_end = make()
-    start = np.array([each.value for each in numbers(scene, by)])
+    start = np.array([number.value for number in numbers(scene, by)])
     true = scene.with_values(dict(zip(by, start * (1.0 + 0.08 * np.cos(np.arange(len(by)))), strict=True)))
     settings = {"rtol": 1e-8, "atol": 1e-10}
 
@@ -187,9 +187,10 @@ def _fit(make: Callable[[], Problem]) -> Measured:
         return (seen(scene.with_values(dict(zip(by, (x * start).tolist(), strict=True)))) - values).ravel() / NOISE
 
     def two_point() -> None:
-        found[1] = start * least_squares(
-            off, np.ones(len(by)), x_scale="jac", ftol=1e-8, xtol=1e-8, gtol=None, diff_step=1e-6
-        ).x
+        found[1] = (
+            start
+            * least_squares(off, np.ones(len(by)), x_scale="jac", ftol=1e-8, xtol=1e-8, gtol=None, diff_step=1e-6).x
+        )
 
     seconds = turns(exact, two_point, rounds=7)
     apart = float(np.max(np.abs(found[0] / found[1] - 1.0)))

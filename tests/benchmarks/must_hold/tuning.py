@@ -31,7 +31,7 @@ class Setting:
 
 def fastest(settings: Sequence[Setting], level: float) -> Setting:
     """Of those that err by `level` or less. Raises RivalsDiffer where there is none."""
-    good = [each for each in settings if each.error <= level]
+    good = [setting for setting in settings if setting.error <= level]
     if not good:
         raise RivalsDiffer(f"no setting errs by {level:g} or less")
     good = sorted(good, key=lambda each: _once(each.run))[:FINAL]

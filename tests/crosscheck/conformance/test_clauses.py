@@ -61,7 +61,7 @@ def test_an_engine_that_refuses_everything_has_shown_nothing() -> None:
     lines = to_offer(outcomes)
     assert "represent prismatic hinges, motors" in lines
     assert 'represent free hinges, connectors: bushing and name "connectors" in `takes`' in lines
-    assert sum(map(len, lines.values())) == sum(each.status == "not offered" for each in outcomes)
+    assert sum(map(len, lines.values())) == sum(outcome.status == "not offered" for outcome in outcomes)
 
 
 def test_what_shows_too_little_is_not_kept_however_much_holds() -> None:

@@ -87,8 +87,8 @@ def without_loads(run: Trajectory, scene: Scene, of: Asks) -> Trajectory:
 def coriolis_reversed(run: Trajectory, scene: Scene, of: Asks) -> Trajectory:
     """Terms of the speeds with the other sign, dampers as they are: what dampers give is left at rest."""
     hinges = tuple(
-        msgspec.structs.replace(each, rotation=msgspec.structs.replace(each.rotation, rate_rad_s=0.0))
-        for each in scene.hinges
+        msgspec.structs.replace(hinge, rotation=msgspec.structs.replace(hinge.rotation, rate_rad_s=0.0))
+        for hinge in scene.hinges
     )
     at_rest = of(msgspec.structs.replace(scene, hinges=hinges))["by_speed"]
     by_speed = 2.0 * at_rest - run.derivatives["by_speed"]
@@ -190,7 +190,7 @@ def test_engines_keep_the_clauses_on_derivatives(name: str) -> None:
     if "missing" in {each.status for each in found}:
         pytest.skip(found[0].message)
     left = {each.clause for each in found if each.status != "holds"}
-    without = {each.name for each in LINEARISED.clauses if each.name.startswith("derivatives")}
+    without = {clause.name for clause in LINEARISED.clauses if clause.name.startswith("derivatives")}
     offered_not = {"native": set(), "exudyn": without}.get(name, {"derivatives-of-a-flexible-body"})
     assert left == offered_not and not any(each.status == "broken" for each in found), found
 

@@ -156,7 +156,7 @@ def in_single(found: Any) -> Any:
     if isinstance(found, list | tuple):
         return type(found)(map(in_single, found))
     if is_dataclass(found) and not isinstance(found, type):
-        return replace(found, **{each.name: in_single(getattr(found, each.name)) for each in fields(found)})
+        return replace(found, **{field.name: in_single(getattr(found, field.name)) for field in fields(found)})
     return found
 
 

@@ -39,7 +39,9 @@ def test_what_an_engine_does_to_its_process_reaches_no_other_clause() -> None:
     """Without a path no module is found: in a process that serves several clauses there would be no engine."""
     clauses = ("a-run-is-what-was-asked-for", "a-solve-takes-time", "a-refusal-has-a-reason", "version-is-text")
     outcomes = list(try_engine("clears_its_path", clauses, BAD))
-    assert {each.clause: (each.status, each.message) for each in outcomes} == dict.fromkeys(clauses, ("holds", ""))
+    assert {outcome.clause: (outcome.status, outcome.message) for outcome in outcomes} == dict.fromkeys(
+        clauses, ("holds", "")
+    )
 
 
 @pytest.mark.parametrize("method", [FORKED, SPAWN])
@@ -88,5 +90,5 @@ def tell_process(trial: ClauseTrial, emit: Callable[[ClauseOutcome], None]) -> N
 
 def test_an_engine_that_does_not_exist_is_missing() -> None:
     outcomes = list(try_engine("pinochio", TWO, FAKE))
-    assert {each.status for each in outcomes} == {"missing"}
+    assert {outcome.status for outcome in outcomes} == {"missing"}
     assert 'there is no engine "pinochio"' in verdict_on(outcomes).text

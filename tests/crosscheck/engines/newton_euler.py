@@ -69,7 +69,7 @@ def rotation(quaternion) -> np.ndarray:
 
 def body_residual(scene: Scene, snapshot: Snapshot, name: str) -> np.ndarray:
     """[torque; force] (6,) about the mass centre that Newton and Euler miss: zero for a right snapshot."""
-    body = next(each for each in scene.bodies if each.name == name)
+    body = next(body for body in scene.bodies if body.name == name)
     frame, com = snapshot.markers[name], snapshot.markers[f"{name} com"]
     R = rotation(frame.quaternion)
     J = R @ np.array(body.inertia_kg_m2) @ R.T

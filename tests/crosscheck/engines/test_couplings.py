@@ -76,7 +76,7 @@ def test_pinocchio_would_notice_a_wrong_ratio():
     pytest.importorskip("pinocchio")
     scene = machine(False)
     first = scene.couplings[0]
-    terms = tuple(msgspec.structs.replace(each, ratio=each.ratio * (1.0 + 1e-6)) for each in first.terms)
+    terms = tuple(msgspec.structs.replace(term, ratio=term.ratio * (1.0 + 1e-6)) for term in first.terms)
     wrong = msgspec.structs.replace(
         scene, couplings=(msgspec.structs.replace(first, terms=terms), *scene.couplings[1:])
     )

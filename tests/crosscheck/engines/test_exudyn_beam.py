@@ -39,8 +39,10 @@ def spin_up(data: dict, theory: str, elements: int, free: bool = False) -> s.Sce
 
 def tip_minimum(scene: s.Scene, step: float) -> tuple[float, float]:
     """Largest backward deflection of the tip across the hub's axis, and when: a parabola through the lowest samples."""
-    run = ExudynBeamEngine().compile(scene).simulate(
-        Run(np.linspace(0.0, 8.0, 401)), Effort("step", step, "GeneralizedAlpha")
+    run = (
+        ExudynBeamEngine()
+        .compile(scene)
+        .simulate(Run(np.linspace(0.0, 8.0, 401)), Effort("step", step, "GeneralizedAlpha"))
     )
     assert run.status == "finished"
     across = _deflection(run, scene.hinges[0].rotation.prescribed_rad)
@@ -143,10 +145,13 @@ def test_what_is_out_of_the_plane_goes_to_the_elements_in_space():
                   function=s.Constant(value=1.0))  # fmt: skip
     sprung = s.Planar(name="hub", parent="ground", child="beam", x=s.LinearCoordinate(stiffness_N_m=1.0))
     for changed in (
-        replace(scene, loads=(push,)), replace(scene, loads=(replace(push, type="torque", direction=(1.0, 0.0, 0.0)),)),
+        replace(scene, loads=(push,)),
+        replace(scene, loads=(replace(push, type="torque", direction=(1.0, 0.0, 0.0)),)),
         replace(scene, loads=(replace(push, direction=(0.0, 1.0, 0.0), frame="node"),)),
-        replace(scene, hinges=(sprung,)), replace(scene, gravity_m_s2=(0.0, 0.0, -9.8)),
-        replace(scene, bodies=(every_family,)), replace(scene, hinges=(tilted,)),
+        replace(scene, hinges=(sprung,)),
+        replace(scene, gravity_m_s2=(0.0, 0.0, -9.8)),
+        replace(scene, bodies=(every_family,)),
+        replace(scene, hinges=(tilted,)),
     ):
         support = engine.supports(changed)
         assert support.kind == "surrogate" and "instead of modes; beam: shear" in support.reason
@@ -155,7 +160,7 @@ def test_what_is_out_of_the_plane_goes_to_the_elements_in_space():
 
 def test_refusals_name_their_reason():
     scene = spin_up(dict(BEAM_K, rotary=1e-3), "euler-bernoulli", 4)
-    off_axis = tuple(replace(each, reference_point_m=(0.02, 0.0)) for each in scene.bodies[0].stations)
+    off_axis = tuple(replace(station, reference_point_m=(0.02, 0.0)) for station in scene.bodies[0].stations)
     for changed, word in (
         (replace(scene, bodies=(replace(scene.bodies[0], stations=off_axis),)), "couples strains on the axis"),
         (replace(scene, bodies=(s.RigidBody(name="beam", mass_kg=1.0, inertia_kg_m2=np.eye(3).tolist()),)), "a beam"),

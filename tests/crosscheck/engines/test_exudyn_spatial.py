@@ -48,8 +48,8 @@ def run(scene: s.Scene, duration: float, step: float, method: str = "Trapezoidal
 
 
 def refined(scene: s.Scene, factor: int) -> s.Scene:
-    finer = (replace(each, elements=factor * each.elements) for each in scene.bodies if isinstance(each, s.BeamBody))
-    return replace(scene, bodies=(*finer, *(each for each in scene.bodies if not isinstance(each, s.BeamBody))))
+    finer = (replace(body, elements=factor * body.elements) for body in scene.bodies if isinstance(body, s.BeamBody))
+    return replace(scene, bodies=(*finer, *(body for body in scene.bodies if not isinstance(body, s.BeamBody))))
 
 
 def at_rest(scene: s.Scene) -> tuple[np.ndarray, np.ndarray]:
@@ -111,7 +111,7 @@ def test_elements_of_any_section_converge_with_the_second_order():
     for elements in (8, 16):
         position, turn = turned_by(ROD, elements)
         errors.append(np.concatenate([turn.ravel(), position]) - expected)
-    sizes = [np.linalg.norm(each) for each in errors]
+    sizes = [np.linalg.norm(error) for error in errors]
     assert np.log2(sizes[0] / sizes[1]) == pytest.approx(2.0, abs=0.1)
     left = np.abs(errors[1] + (errors[1] - errors[0]) / 3.0).max()
     assert left < 0.05 * sizes[1]

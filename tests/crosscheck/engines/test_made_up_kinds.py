@@ -70,7 +70,7 @@ def test_dense_frames_follow_from_freedoms() -> None:
 
 
 def test_joints_of_peers_follow_from_freedoms() -> None:
-    assert [(each.motion, each.pitch) for each in freedoms(BORING)] == [("screw", 0.5), ("slide", 0.0)]
+    assert [(freedom.motion, freedom.pitch) for freedom in freedoms(BORING)] == [("screw", 0.5), ("slide", 0.0)]
     scene = s.Scene(name="odd", bodies=(), hinges=(BORING,))
     assert obstacle(scene, "Anything", ()) == 'hinge "joint" is a screw: the adapter of Anything offers no such joint'
     assert obstacle(scene, "Anything", (), screws=True) == ""

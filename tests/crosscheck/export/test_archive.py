@@ -223,7 +223,7 @@ def test_results_fit_their_schema(tmp_path: Path) -> None:
     ("accepted", {"a comparison": {"a | b": {"E": 1.0, "V": 2.0}}}, "V"),
 ])  # fmt: skip
 def test_a_wrong_file_does_not_fit(name: str, wrong: dict[str, Any], what: str) -> None:
-    file = next(file for file, each in OF_CASES.items() if each == name)
+    file = next(file for file, case in OF_CASES.items() if case == name)
     content = _read(next(case.folder / file for case in shipped() if (case.folder / file).exists()))
     with pytest.raises(jsonschema.ValidationError, match=what):
         validator(name).validate(content | wrong)

@@ -141,14 +141,18 @@ def splines(body: BeamBody, degree: int, continuity: int) -> list[BSpline]:
 
 
 def gauss(body: BeamBody) -> tuple[Real, Real]:
-    nodes = np.unique([*np.linspace(0.0, body.length_m, body.elements + 1), *(each.x_m for each in body.stations)])
+    nodes = np.unique(
+        [*np.linspace(0.0, body.length_m, body.elements + 1), *(station.x_m for station in body.stations)]
+    )
     s, w = np.polynomial.legendre.leggauss(6)
     x = np.concatenate([0.5 * (b + a) + 0.5 * (b - a) * s for a, b in pairwise(nodes)])
     return x, np.concatenate([0.5 * (b - a) * w for a, b in pairwise(nodes)])
 
 
 def section(body: BeamBody, key: str, x: Real) -> Real:
-    return np.interp(x, [each.x_m for each in body.stations], [getattr(each, key) for each in body.stations])
+    return np.interp(
+        x, [station.x_m for station in body.stations], [getattr(station, key) for station in body.stations]
+    )
 
 
 def by_hand(body: BeamBody) -> dict[str, Any]:
@@ -206,8 +210,8 @@ def by_hand(body: BeamBody) -> dict[str, Any]:
         "level": "full", "clamped": True, "modes": len(omega),
         "stiffness": np.diag(omega**2).tolist(), "damping": np.diag(2.0 * zeta * omega).tolist(),
         "points": {
-            "mass_kg": np.concatenate([each[0] for each in points]).tolist(),
-            "position_m": np.concatenate([each[1] for each in points]).tolist(),
+            "mass_kg": np.concatenate([point[0] for point in points]).tolist(),
+            "position_m": np.concatenate([point[1] for point in points]).tolist(),
             "translation_modes": translation.tolist(), "rotation_modes": rotation.tolist(),
             "mass_centre_offset_m": np.zeros((count, 3)).tolist(), "inertia_kg_m2": np.zeros((count, 3, 3)).tolist(),
         },

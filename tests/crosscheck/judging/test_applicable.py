@@ -150,7 +150,7 @@ def test_an_energy_that_a_guest_does_not_know_is_counted_too() -> None:
 
 
 def test_what_no_guest_offers_is_not_applicable_to_them() -> None:
-    text = ONE_PAIR.replace('goals = {', 'goals = { "drive" = 1e-3,')
+    text = ONE_PAIR.replace("goals = {", 'goals = { "drive" = 1e-3,')
     guests = [*ladder("guest", {TIP: way()}), *ladder("second", {TIP: way()})]
     outcome = judged(text, guests, asked=("guest", "second"))
     assert (outcome.ok, len(outcome.all)) == (True, 1)
@@ -266,7 +266,9 @@ def test_a_claim_in_a_record_that_does_not_say_what_the_scene_leaves_open_is_not
     assert judged(THREE_OPEN, records(said=False)[3:], undetermined=msgspec.UNSET).undetermined == 0
 
 
-CONTROL = THREE_OPEN + """
+CONTROL = (
+    THREE_OPEN
+    + """
 [[control]]
 name = "too heavy"
 mutation = "mass"
@@ -275,6 +277,7 @@ a = { variant = "rigid", engine = "two" }
 b = { variant = "rigid", engine = "three" }
 goals = { "load:pin.torque" = 1e-3 }
 """
+)
 
 
 def test_a_control_that_is_compared_in_nothing_is_lost_and_the_session_red(tmp_path):
@@ -284,7 +287,7 @@ def test_a_control_that_is_compared_in_nothing_is_lost_and_the_session_red(tmp_p
     assert seen.ok and seen.controls() == (1, 1) and not seen.lost_controls
     lost = judged(CONTROL, [*records(said=True), *faulty], undetermined=(TORQUE,))
     assert (lost.unexpected, lost.controls(), lost.ok) == ([], (0, 0), False)
-    assert [each.control for each in lost.lost_controls] == ["too heavy"]
+    assert [control.control for control in lost.lost_controls] == ["too heavy"]
     assert lost.headline == "1 deliberate fault was compared in nothing"
     shown = told(lost)
     write_summary(lost, tmp_path / "summary.md")

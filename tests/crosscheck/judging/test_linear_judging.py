@@ -43,7 +43,7 @@ def judged(*records: list[RunRecord]) -> SessionOutcome:
     infos = {"rigid": VariantInfo(level="rigid", drawing=None, coordinates=NAMES)}
     run = select(run_file(TEXT), ())
     case = CaseRecord(case="made/made", run=run, provenance=None, readme="", variants=infos)
-    return conclude(collect([case, *(run for each in records for run in each)]))
+    return conclude(collect([case, *(run for record in records for run in record)]))
 
 
 def one(records: list[RunRecord]) -> Result:

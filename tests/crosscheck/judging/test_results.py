@@ -52,7 +52,7 @@ def steps(signals: dict[str, np.ndarray], order: float) -> list[RunRecord]:
     values = {h: {name: (1.0 + h**order) * signal for name, signal in signals.items()} for h in (0.4, 0.2, 0.1)}
     return [
         msgspec.structs.replace(
-            run, effort_kind="step", effort_value=h, channels={name: pack(each) for name, each in values[h].items()}
+            run, effort_kind="step", effort_value=h, channels={name: pack(value) for name, value in values[h].items()}
         )
         for run, h in zip(ladder("one", signals), values, strict=True)
     ]
@@ -89,7 +89,9 @@ def test_a_record_without_an_effort_has_no_runs() -> None:
         ({"status": "diverged", "message": "why"}, "diverged", "diverged at t = 1 s: why", 1.0),
         ({"status": "diverged", "message": "why", "times": None}, "diverged", "diverged at t = 0 s: why", 0.0),
         (
-            {"status": "diverged", "message": "why", "times": pack(TIMES[:0])}, "diverged", "diverged at t = 0 s: why",
+            {"status": "diverged", "message": "why", "times": pack(TIMES[:0])},
+            "diverged",
+            "diverged at t = 0 s: why",
             0.0,
         ),
     ],

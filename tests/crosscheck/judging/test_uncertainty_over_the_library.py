@@ -97,7 +97,7 @@ def test_u_bounds_the_error(case: Case, engine: str) -> None:
         if channel not in ladder.signals[-1]:
             continue
         truth = reference.channels[channel]
-        errors = [float(np.max(distance(channel, each[channel], truth))) for each in ladder.signals]
+        errors = [float(np.max(distance(channel, signal[channel], truth))) for signal in ladder.signals]
         for place, bound in ladder.judged(channel):
             count += 1
             if errors[place] > bound + known.uncertainty:
@@ -113,7 +113,7 @@ def test_u_bounds_the_distance_to_the_finest_run(case: Case, variant: Variant) -
     ladder = climbed(case, variant, "native", times, (*TOLERANCES, FINEST))
     exceeded, count = [], 0
     for channel, truth in ladder.signals[-1].items():
-        errors = [float(np.max(distance(channel, each[channel], truth))) for each in ladder.signals]
+        errors = [float(np.max(distance(channel, signal[channel], truth))) for signal in ladder.signals]
         for place, bound in ladder.judged(channel):
             if place < len(ladder.tolerances) - 1:
                 count += 1

@@ -134,7 +134,7 @@ def listing(**changes: object) -> RunFile:
         name="listed", variant="rigid", engines=("native", "pinocchio"), goals={"momentum": 1e-7, "energy.total": 1e-9},
         scales={"momentum.linear": 1.0, "energy.total": 2.0},
     )  # fmt: skip
-    everyone = next(each for each in example().comparisons if each.variant == "rigid")
+    everyone = next(comparison for comparison in example().comparisons if comparison.variant == "rigid")
     everyone = msgspec.structs.replace(everyone, goals={"energy": 1e-9})
     run = msgspec.structs.replace(example(), comparisons=(everyone, msgspec.structs.replace(listed, **changes)))
     check_run_file(run)
@@ -142,13 +142,15 @@ def listing(**changes: object) -> RunFile:
 
 
 def test_a_foreign_engine_joins_listed_engines_in_what_is_open_to_it_nowhere_else() -> None:
-    found = [each for each in select(listing(), ("mine", "yours")).comparisons if each.name == "listed"]
+    found = [
+        comparison for comparison in select(listing(), ("mine", "yours")).comparisons if comparison.name == "listed"
+    ]
     assert {(each.a.engine, each.b.engine) for each in found} == {("mine", "yours")}
-    found = [each for each in select(listing(), ("mine",)).comparisons if each.name == "listed"]
+    found = [comparison for comparison in select(listing(), ("mine",)).comparisons if comparison.name == "listed"]
     assert {(each.a.engine, each.b.engine) for each in found} == {("native", "mine"), ("pinocchio", "mine")}
     assert {tuple(each.goals) for each in found} == {("momentum",)}
     assert {tuple(each.scales) for each in found} == {("momentum.linear",)}
-    own = [each for each in select(listing(), ()).comparisons if each.name == "listed"]
+    own = [comparison for comparison in select(listing(), ()).comparisons if comparison.name == "listed"]
     assert [(each.a.engine, each.b.engine, len(each.goals)) for each in own] == [("native", "pinocchio", 2)]
 
 
@@ -161,18 +163,21 @@ def test_a_foreign_engine_joins_a_variant_of_which_only_listed_engines_are_compa
 
 def test_a_foreign_engine_is_not_expected_to_differ_as_listed_ones_are() -> None:
     run = listing(expect="refused", because="no momentum", reason="they have none")
-    assert not [each for each in select(run, ("mine",)).comparisons if each.name == "listed"]
+    assert not [comparison for comparison in select(run, ("mine",)).comparisons if comparison.name == "listed"]
 
 
 def conserving(**changes: object) -> Conservation:
     return Conservation(**{"variant": "rigid", "quantity": "energy", "limit": 1e-9, "engines": ("native",)} | changes)
 
 
-@pytest.mark.parametrize("item, engines", [
-    (conserving(), ("native", "mine")),
-    (conserving(engines=()), ("native", "pinocchio", "mujoco", "exudyn", "mine")),
-    (conserving(expect="differ", band=(1e-8, 1e-7), reason="it is lost"), ("native",)),
-])
+@pytest.mark.parametrize(
+    "item, engines",
+    [
+        (conserving(), ("native", "mine")),
+        (conserving(engines=()), ("native", "pinocchio", "mujoco", "exudyn", "mine")),
+        (conserving(expect="differ", band=(1e-8, 1e-7), reason="it is lost"), ("native",)),
+    ],
+)
 def test_a_foreign_engine_joins_those_that_a_conserved_quantity_lists(item: Conservation, engines: tuple[str]) -> None:
     run = msgspec.structs.replace(example(), conservations=(item,))
     check_run_file(run)
@@ -180,17 +185,20 @@ def test_a_foreign_engine_joins_those_that_a_conserved_quantity_lists(item: Cons
     assert found.engines == engines
     (alone,) = select(run, ("mine",)).conservations if "mine" in engines else ((),)
     assert alone == () or alone.engines == ("mine",)
-    assert select(run, ()).conservations[0].engines == tuple(each for each in engines if each != "mine")
+    assert select(run, ()).conservations[0].engines == tuple(engine for engine in engines if engine != "mine")
 
 
-@pytest.mark.parametrize("changes, text", [
-    ({"channels": ()}, "name at least one channel"),
-    ({"channels": ("markr",)}, '"markr" can name no channel'),
-    ({"variants": ("rigd",)}, 'did you mean "rigid"'),
-    ({"engines": ("natve",)}, 'did you mean "native"'),
-    ({"engines": ("native", "native")}, "listed twice"),
-    ({"reason": " "}, "give the reason"),
-])
+@pytest.mark.parametrize(
+    "changes, text",
+    [
+        ({"channels": ()}, "name at least one channel"),
+        ({"channels": ("markr",)}, '"markr" can name no channel'),
+        ({"variants": ("rigd",)}, 'did you mean "rigid"'),
+        ({"engines": ("natve",)}, 'did you mean "native"'),
+        ({"engines": ("native", "native")}, "listed twice"),
+        ({"reason": " "}, "give the reason"),
+    ],
+)
 def test_what_a_case_leaves_open_is_checked_with_its_place(changes: dict[str, object], text: str) -> None:
     item = OpenChannels(**{"channels": ("momentum",), "variants": ("rigid",), "reason": "it is zero"} | changes)
     check_run_file(msgspec.structs.replace(example(), open=(OpenChannels(channels=("work",), reason="it is zero"),)))

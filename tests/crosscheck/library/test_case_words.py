@@ -172,7 +172,7 @@ def test_channels_of_one_family_have_one_title_and_one_unit() -> None:
         titles.setdefault(family(name), set()).add(part.title)
         if part.unit:
             assert part.unit.replace(" ", "").replace("1", "rad") == unit(name), name
-    assert all(len(each) == 1 for each in titles.values()) and len(titles) == len(set.union(*titles.values()))
+    assert all(len(title) == 1 for title in titles.values()) and len(titles) == len(set.union(*titles.values()))
 
 
 OTHERS = ["marker:tip.speed", "marker.position", "energy:kinetic", "energy", "works", "", "load"]
@@ -190,8 +190,8 @@ def test_what_is_conserved_is_a_channel() -> None:
 def test_the_outputs_of_the_contract_are_those_of_our_own_trajectories() -> None:
     """An output that one of the three lacks would be lost on its way to the judging."""
     of_runs = OUTPUTS.keys() - set(LINEAR)
-    assert of_runs <= {each.name for each in dataclasses.fields(OwnTrajectory)}
-    assert of_runs - {"work"} <= {each.name for each in dataclasses.fields(Snapshot)}
+    assert of_runs <= {field.name for field in dataclasses.fields(OwnTrajectory)}
+    assert of_runs - {"work"} <= {field.name for field in dataclasses.fields(Snapshot)}
 
 
 def test_what_an_engine_says_of_its_own_derivatives_is_a_channel_that_nobody_judges() -> None:

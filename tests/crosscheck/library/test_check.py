@@ -237,5 +237,5 @@ def test_the_reference_of_the_run_file_has_every_key(kind: type, heading: str) -
     (item,) = [part for part in reference.split("\n- ") if part.startswith(heading)]
     tables = {"variant", "comparison", "control", "conservation", "open", "chart", "reference"}
     tables = tables if kind is RunFile else set()
-    keys = {each.encode_name for each in msgspec.structs.fields(kind)} - tables
+    keys = {field.encode_name for field in msgspec.structs.fields(kind)} - tables
     assert {key for key in keys if f"``{key}``" not in item} == set()

@@ -56,11 +56,14 @@ SKEW = ((2.0, 0.0, 0.1), (0.0, 2.4, 0.0), (0.1, 0.0, 3.0))
 @pytest.mark.parametrize(
     "scene",
     [
-        of_bus(inertia_kg_m2=SKEW), of_bus(com_m=(0.0, 0.0, 0.1)), with_(SPINNING, gravity_m_s2=(0.0, 0.0, -9.81)),
+        of_bus(inertia_kg_m2=SKEW),
+        of_bus(com_m=(0.0, 0.0, 0.1)),
+        with_(SPINNING, gravity_m_s2=(0.0, 0.0, -9.81)),
         with_(SPINNING, hinges=(with_(FLIGHT, angular_velocity_rad_s=(0.0, 1e-3, -0.1)),)),
         with_(SPINNING, hinges=(with_(FLIGHT, velocity_m_s=(0.0, 0.0, 1.0)),)),
         with_(SPINNING, hinges=(with_(FLIGHT, quaternion=(0.8, 0.6, 0.0, 0.0)),)),
-        with_(SPINNING, wheels=(with_(WHEEL, axis=(0.0, 0.6, 0.8)),)), with_(SPINNING, loads=(TORQUE, PUSH)),
+        with_(SPINNING, wheels=(with_(WHEEL, axis=(0.0, 0.6, 0.8)),)),
+        with_(SPINNING, loads=(TORQUE, PUSH)),
         with_(SPINNING, loads=(with_(TORQUE, direction=(0.6, 0.0, 0.8)),)),
         with_(SPINNING, point_masses=(PointMass(name="m", body="bus", mass_kg=1.0),)),
         with_(SPINNING, closures=(Closure(name="c", type="universal", body_a="ground", body_b="bus"),)),
@@ -75,9 +78,11 @@ def test_the_mass_of_a_body_whose_mass_centre_rests_is_idle() -> None:
     assert "no force acts" in idle(SPINNING, "mass", "bus")
     moving = with_(FLIGHT, velocity_m_s=(1.0, 0.0, 0.0))
     for scene in (
-        with_(SPINNING, hinges=(moving,)), with_(SPINNING, loads=(PUSH,)),
+        with_(SPINNING, hinges=(moving,)),
+        with_(SPINNING, loads=(PUSH,)),
         with_(SPINNING, gravity_m_s2=(0.0, -1.0, 0.0)),
-        with_(SPINNING, wheels=(with_(WHEEL, offset_m=(0.1, 0.0, 0.0)),)), of_bus(com_m=(0.1, 0.0, 0.0)),
+        with_(SPINNING, wheels=(with_(WHEEL, offset_m=(0.1, 0.0, 0.0)),)),
+        of_bus(com_m=(0.1, 0.0, 0.0)),
     ):
         assert idle(scene, "mass", "bus") == ""
 
@@ -133,7 +138,7 @@ def test_a_mode_out_of_the_plane_is_never_excited(family: Any, axis: int) -> Non
 
 @pytest.mark.parametrize(("stiffness", "round_one"), [(10.0, True), (11.0, False)])
 def test_the_modes_of_a_round_section_have_no_order(stiffness: float, round_one: bool) -> None:
-    stations = tuple(with_(each, EIz_Nm2=stiffness) for each in BAR.stations)
+    stations = tuple(with_(station, EIz_Nm2=stiffness) for station in BAR.stations)
     beam = with_(BAR, stations=stations, modes=Modes(count=2, families=("bending_y", "bending_z")))
     scene = with_(TWISTED, bodies=(beam,))
     assert bool(idle(scene, "mode_order", "bar")) == round_one

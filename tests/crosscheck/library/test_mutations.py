@@ -29,12 +29,18 @@ SCENE = Scene(
     gravity_m_s2=(0.0, 0.0, -9.81),
     bodies=(
         RigidBody(
-            name="hub", mass_kg=4.0, com_m=(0.1, 0.0, 0.0), inertia_kg_m2=INERTIA,
+            name="hub",
+            mass_kg=4.0,
+            com_m=(0.1, 0.0, 0.0),
+            inertia_kg_m2=INERTIA,
             nodes=(Node(name="port", quaternion=TURNED),),
         ),
         BeamBody(
-            name="boom", length_m=1.0, elements=4,
-            stations=(BeamStation(x_m=0.0, **STATION), BeamStation(x_m=1.0, **STATION)), modes=Modes(count=2),
+            name="boom",
+            length_m=1.0,
+            elements=4,
+            stations=(BeamStation(x_m=0.0, **STATION), BeamStation(x_m=1.0, **STATION)),
+            modes=Modes(count=2),
             level="stiffened",
         ),
         RigidBody(name="tip", mass_kg=1.0, inertia_kg_m2=INERTIA),
@@ -46,7 +52,11 @@ SCENE = Scene(
     ),
     wheels=(
         Wheel(
-            name="wheel", body="hub", axis=(0.0, 0.0, 1.0), mass_kg=1.0, axial_inertia_kg_m2=0.1,
+            name="wheel",
+            body="hub",
+            axis=(0.0, 0.0, 1.0),
+            mass_kg=1.0,
+            axial_inertia_kg_m2=0.1,
             transverse_inertia_kg_m2=0.05,
         ),
     ),
@@ -114,7 +124,12 @@ PUSH = Sine(amplitude=2.0, angular_frequency_rad_s=3.0)
 def everything() -> Scene:
     """A scene with something for every mutation to change."""
     swing = AngularCoordinate(
-        angle_rad=0.3, rate_rad_s=0.2, stiffness_Nm_rad=3.0, damping_Nms_rad=0.1, rest_rad=0.1, armature_kg_m2=0.2,
+        angle_rad=0.3,
+        rate_rad_s=0.2,
+        stiffness_Nm_rad=3.0,
+        damping_Nms_rad=0.1,
+        rest_rad=0.1,
+        armature_kg_m2=0.2,
         torque_Nm=PUSH,
     )
     skew = ((0.2, 0.01, 0.02), (0.01, 0.3, 0.03), (0.02, 0.03, 0.4))
@@ -124,8 +139,8 @@ def everything() -> Scene:
     )  # fmt: skip
     boom = msgspec.structs.replace(SCENE.bodies[1], modes=Modes(count=2, damping_ratio=0.01), nodes=())
     stations = tuple(
-        msgspec.structs.replace(each, rotary_y_kg_m=1e-4, rotary_z_kg_m=2e-4, GAy_N=1e5, GAz_N=1e5)
-        for each in boom.stations
+        msgspec.structs.replace(station, rotary_y_kg_m=1e-4, rotary_z_kg_m=2e-4, GAy_N=1e5, GAz_N=1e5)
+        for station in boom.stations
     )
     boom = msgspec.structs.replace(boom, stations=stations)
     tip = msgspec.structs.replace(hub, name="tip")
@@ -205,7 +220,7 @@ def everything() -> Scene:
 def beside_its_axis() -> Scene:
     """The scene with a beam whose sections are stated off its axis."""
     hub, boom, *others = everything().bodies
-    stations = tuple(msgspec.structs.replace(each, reference_point_m=(0.02, 0.01)) for each in boom.stations)
+    stations = tuple(msgspec.structs.replace(station, reference_point_m=(0.02, 0.01)) for station in boom.stations)
     bodies = (hub, msgspec.structs.replace(boom, stations=stations), *others)
     return msgspec.structs.replace(everything(), bodies=bodies)
 
@@ -387,7 +402,7 @@ def test_strains_become_modes_of_small_deflection() -> None:
         assert isinstance(changed, BeamBody) and changed.level == level
         assert changed.modes == Modes(count=6, families=("bending_y",)) and changed.elements == 12
         check_scene(mutate(scene, name, "boom"))
-    stations = tuple(msgspec.structs.replace(each, curvature_1_m=(0.0, 0.5, 0.0)) for each in bent.stations)
+    stations = tuple(msgspec.structs.replace(station, curvature_1_m=(0.0, 0.5, 0.0)) for station in bent.stations)
     arc = msgspec.structs.replace(SCENE, bodies=(hub, msgspec.structs.replace(bent, stations=stations), tip))
     for name in ("dropped_stiffening", "dropped_deformation", "mode_sign"):
         with pytest.raises(CaseError):

@@ -122,7 +122,7 @@ goals = {{ "marker:tip" = 1e-6, "load" = 1e-6, "energy" = 1e-6, "momentum" = 1e-
         execute(job, lambda content: records.append(content) if isinstance(content, RunRecord) else None)
     verdicts = conclude(collect(records)).all
     for name in CAUGHT:
-        against = [each.status for each in verdicts if (each.engine_a, each.engine_b) == ("fine", name)]
+        against = [verdict.status for verdict in verdicts if (verdict.engine_a, verdict.engine_b) == ("fine", name)]
         assert "differ" in against, name
 
 
@@ -147,16 +147,20 @@ def test_wrong_derivatives_are_caught_in_an_ordinary_session() -> None:
     records: list[Record] = [record]
     for job in jobs:
         execute(job, lambda content: records.append(content) if isinstance(content, RunRecord) else None)
-    if any("not installed" in each.message for each in records if isinstance(each, RunRecord)):
+    if any("not installed" in record.message for record in records if isinstance(record, RunRecord)):
         pytest.skip("Pinocchio is not installed")
     verdicts = [each for each in conclude(collect(records)).all if each.engine_a == "native"]
-    assert {each.channel: each.status for each in verdicts if each.engine_b == "pinocchio"} == dict.fromkeys(
+    assert {
+        verdict.channel: verdict.status for verdict in verdicts if verdict.engine_b == "pinocchio"
+    } == dict.fromkeys(
         ("derivatives.by_displacement", "derivatives.by_speed", "derivatives.by_force", "frequencies"), "agree"
     )
     for name, channels in LINEAR.items():
-        found = {each.channel for each in verdicts if each.engine_b == name and each.status == "differ"}
+        found = {verdict.channel for verdict in verdicts if verdict.engine_b == name and verdict.status == "differ"}
         assert found == channels, name
-    reasons = [each.reason for each in verdicts if each.status == "differ" and each.channel != "frequencies"]
+    reasons = [
+        verdict.reason for verdict in verdicts if verdict.status == "differ" and verdict.channel != "frequencies"
+    ]
     assert all("farthest apart" in reason and "d udot[" in reason for reason in reasons)
 
 
@@ -213,15 +217,15 @@ def test_what_the_reference_asks_for_is_judged_beside_what_comparisons_do(folder
 
 
 def test_the_reference_catches_faults_of_the_scene_and_of_an_answer(seeing: MutationScore) -> None:
-    noticed = {each.mutation for each in seeing.mutants if each.by_reference == "noticed"}
+    noticed = {mutant.mutation for mutant in seeing.mutants if mutant.by_reference == "noticed"}
     assert {"com_sign", "gravity_sign", "gravity_dropped", "node_position"} <= noticed
     assert {"orientation_transposed", "velocity_axes", "late", "energy_gravity"} <= noticed
     assert seeing.score_by_reference is not None and seeing.score_by_reference >= 0.95
-    assert all(set(each.reference) <= {*each.channels} for each in seeing.mutants)
+    assert all(set(mutant.reference) <= {*mutant.channels} for mutant in seeing.mutants)
 
 
 def test_of_what_the_reference_does_not_hold_it_says_nothing(seeing: MutationScore) -> None:
-    (reaction,) = [each for each in seeing.mutants if each.mutation == "load_reaction"]
+    (reaction,) = [mutant for mutant in seeing.mutants if mutant.mutation == "load_reaction"]
     assert (reaction.outcome, reaction.by_reference) == ("noticed", None)
 
 
@@ -229,7 +233,7 @@ def test_an_engine_that_is_not_at_the_reference_itself_is_not_credited_with_diff
     folder: Path, tmp_path: Path
 ) -> None:
     score = campaign(folder, tmp_path / "out", "biased")
-    judged = {name for each in score.mutants for name in each.reference}
+    judged = {name for mutant in score.mutants for name in mutant.reference}
     assert "marker:tip.position" not in judged
 
 

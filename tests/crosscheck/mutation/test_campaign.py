@@ -54,7 +54,7 @@ def seeing(out: Path) -> MutationScore:
 
 
 def test_the_small_case_notices_its_faults(seeing: MutationScore) -> None:
-    noticed = {each.mutation for each in seeing.mutants if each.outcome == "noticed"}
+    noticed = {mutant.mutation for mutant in seeing.mutants if mutant.outcome == "noticed"}
     assert {"mass", "com", "com_sign", "gravity_sign", "gravity_size", "gravity_dropped", "node_position"} <= noticed
     assert {"load_reaction", "orientation_transposed", "velocity_axes", "late", "energy_gravity"} <= noticed
     assert seeing.score is not None and seeing.score >= 0.95
@@ -212,7 +212,10 @@ def test_only_what_was_judged_counts() -> None:
     ]  # fmt: skip
     found = mutation_score("case", "variant", "engine", mutants, [PassedOver(mutation="five", target="", reason="why")])
     assert (found.score, found.score_at_goals) == (0.5, 0.0)
-    assert {name: (each.noticed, each.mutants) for name, each in found.channels.items()} == {"a": (1, 2), "b": (0, 2)}
+    assert {name: (channel.noticed, channel.mutants) for name, channel in found.channels.items()} == {
+        "a": (1, 2),
+        "b": (0, 2),
+    }
     assert [each.mutation for each in found.missed] == ["two"]
     assert [each.mutation for each in found.not_judged] == ["three"]
 
@@ -231,5 +234,5 @@ PAGE = (ROOT / "docs" / "mutations.md").read_text(encoding="utf-8")
 
 def test_the_page_has_every_row_and_no_other() -> None:
     expected = [f"| `{each.name}` | {each.what} | {each.slip} |" for each in (*CATALOGUE.values(), *FAULTS)]
-    expected += [f"| `{each.name}` | {each.what} |" for each in INVARIANCES]
+    expected += [f"| `{invariance.name}` | {invariance.what} |" for invariance in INVARIANCES]
     assert [line for line in PAGE.splitlines() if line.startswith("| `")] == expected

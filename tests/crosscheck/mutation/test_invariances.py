@@ -36,7 +36,7 @@ from tests.flexmb.modal.coupled_references import coupled_stiffness, section_mas
 from tests.repo.project import ROOT
 from tests.trees import random_scene as random_flexible
 
-BY_NAME = {each.name: each for each in INVARIANCES}
+BY_NAME = {invariance.name: invariance for invariance in INVARIANCES}
 AT = np.array([0.0])
 BOUND = 1e-9  # of a family's size: rounding, times what a mass matrix of random bodies makes of it
 KINDS = ("free", "revolute", "prismatic", "cylindrical", "universal", "gimbal2", "gimbal3", "spherical", "planar")
@@ -76,7 +76,9 @@ def strangers(scene: Scene, counterpart: Counterpart) -> list[str]:
 
 # One is seen in runs alone: it begins at another time; one needs beams.
 @pytest.mark.parametrize(
-    "invariance", [each for each in INVARIANCES if each not in (LATER, RESTATED)], ids=lambda each: each.name
+    "invariance",
+    [invariance for invariance in INVARIANCES if invariance not in (LATER, RESTATED)],
+    ids=lambda each: each.name,
 )
 def test_nothing_changes_in_a_scene_of_every_hinge(invariance: Invariance) -> None:
     counterpart = invariance.of(rigid())
@@ -106,10 +108,10 @@ def test_nothing_changes_in_a_scene_of_later_kinds(name: str) -> None:
 
 def test_a_screw_that_keeps_its_hand_in_a_mirror_is_noticed() -> None:
     counterpart = BY_NAME["mirrored"].of(later_kinds())
-    kept = {each.name: each.pitch_m_rad for each in later_kinds().hinges if isinstance(each, Screw)}
+    kept = {hinge.name: hinge.pitch_m_rad for hinge in later_kinds().hinges if isinstance(hinge, Screw)}
     hinges = tuple(
-        msgspec.structs.replace(each, pitch_m_rad=kept[each.name]) if isinstance(each, Screw) else each
-        for each in counterpart.scene.hinges
+        msgspec.structs.replace(hinge, pitch_m_rad=kept[hinge.name]) if isinstance(hinge, Screw) else hinge
+        for hinge in counterpart.scene.hinges
     )
     wrong = msgspec.structs.replace(counterpart.scene, hinges=hinges)
     assert kept
@@ -163,7 +165,9 @@ def driven_masses() -> Scene:
 
 # One is seen in runs alone: it begins at another time; one needs beams.
 @pytest.mark.parametrize(
-    "invariance", [each for each in INVARIANCES if each not in (LATER, RESTATED)], ids=lambda each: each.name
+    "invariance",
+    [invariance for invariance in INVARIANCES if invariance not in (LATER, RESTATED)],
+    ids=lambda each: each.name,
 )
 def test_nothing_changes_in_a_scene_of_driven_point_masses(invariance: Invariance) -> None:
     counterpart = invariance.of(driven_masses())
@@ -354,8 +358,10 @@ def blades() -> Scene:
 def test_nothing_changes_at_another_reference_point() -> None:
     counterpart = RESTATED.of(blades())
     stations = [station for body in counterpart.scene.bodies for station in getattr(body, "stations", ())]
-    assert len({each.reference_point_m for each in stations}) == 6  # root and tip of the blades and of two other beams
-    assert all(each.stiffness is not None and each.inertia is not None for each in stations)
+    assert (
+        len({station.reference_point_m for station in stations}) == 6
+    )  # root and tip of the blades and of two other beams
+    assert all(station.stiffness is not None and station.inertia is not None for station in stations)
     assert strangers(blades(), counterpart) == []
 
 

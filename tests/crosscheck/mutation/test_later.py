@@ -264,7 +264,7 @@ def test_they_are_printed_and_kept(out: Path, verdicts: dict[str, InvarianceVerd
     assert "pendulum/single" in text and "moved: differ" in text
     stored = json.loads((out / VERDICTS).read_text(encoding="utf-8"))
     assert {each["invariance"]: each["status"] for each in stored["verdicts"]} == {
-        name: each.status for name, each in verdicts.items()
+        name: verdict.status for name, verdict in verdicts.items()
     }
 
 
@@ -278,7 +278,7 @@ def of_a_pendulum_at_rest(out: Path, linear: bool) -> tuple[InvarianceVerdict, .
     """Verdicts on MuJoCo about a hanging pendulum, which does not move."""
     case = load_case(shipped_folder() / "linearised" / "hanging_pendulum")
     if not linear:
-        variants = tuple(msgspec.structs.replace(each, linear=msgspec.UNSET) for each in case.run.variants)
+        variants = tuple(msgspec.structs.replace(variant, linear=msgspec.UNSET) for variant in case.run.variants)
         case = replace(case, run=msgspec.structs.replace(case.run, variants=variants))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("crosscheck.mutation.invariance_runs.run_planned", run_here)

@@ -199,11 +199,11 @@ def test_every_file_of_ours_that_a_peer_runs_through_is_in_its_key(name: str) ->
         execute(job, records.append)
     finally:
         sys.setprofile(None)
-    assert {each.status for each in records if isinstance(each, RunRecord)} == {"finished"}
+    assert {record.status for record in records if isinstance(record, RunRecord)} == {"finished"}
     root = Path(keys.__file__).parents[2]
     names = {Path(file).relative_to(root) for file in files if Path(file).is_relative_to(root)}
-    modules = {".".join(each.with_suffix("").parts).removesuffix(".__init__") for each in names}
-    ours = {each for each in modules if each.partition(".")[0] in ("flexmb", "crosscheck")}
+    modules = {".".join(name.with_suffix("").parts).removesuffix(".__init__") for name in names}
+    ours = {module for module in modules if module.partition(".")[0] in ("flexmb", "crosscheck")}
     covered = sources({type(found).__module__, home(name)}, RECORDING).files.keys()
     missed = {each for each in ours - covered if not each.startswith(tuple(WITHOUT_PART))}
     assert not missed

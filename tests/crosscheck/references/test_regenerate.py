@@ -114,7 +114,7 @@ def test_a_reference_says_what_is_known(made: Path) -> None:
     assert "of fine" in known.how
     assert "E " in known.how
     assert "to stepper" in known.how
-    assert all(0.0 < each.uncertainty < np.inf for each in reference.knowledge.channels.values())
+    assert all(0.0 < channel.uncertainty < np.inf for channel in reference.knowledge.channels.values())
 
 
 def test_routes_run_where_the_scheduler_is(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -102,7 +102,7 @@ def test_the_film_is_shown_and_the_markers_where_there_is_none(four_bar: tuple[C
     results, drawing = four_bar
     (shown,) = animations(Store(), results)
     assert {line["body"] for line in shown["lines"]} == {"crank", "coupler", "rocker"}
-    without = CaseResults(results.case, {key: each for key, each in results.results.items() if key[2] != FILM})
+    without = CaseResults(results.case, {key: result for key, result in results.results.items() if key[2] != FILM})
     (shown,) = animations(Store(), without)
     assert {line["body"] for line in shown["lines"]} == {"coupler", "rocker"}
     assert drawing.gravity != (0.0, 0.0, 0.0)

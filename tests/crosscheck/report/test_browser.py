@@ -273,7 +273,7 @@ def test_text_stands_out(reader: Reader, many: tuple[SessionOutcome, Path], page
             reader.wait("return document.querySelector('.work .plot.drawn') !== null")
         ratios = reader.run(CONTRASTS)
         assert len(ratios) > 60
-        assert [each for each in ratios if each[0] < 4.5] == []
+        assert [ratio for ratio in ratios if ratio[0] < 4.5] == []
         reader.press("Tab")
         assert reader.run("return getComputedStyle(document.activeElement).outlineStyle") == "solid"
 

@@ -46,8 +46,8 @@ def faults(root: ElementTree.Element) -> list[str]:
             found.append(f"time {element.get('time')}")
     for suite in root:
         tests = suite.findall("testcase")
-        counts = {"tests": len(tests), "errors": 0, "failures": sum(each.find("failure") is not None for each in tests)}
-        counts["skipped"] = sum(each.find("skipped") is not None for each in tests)
+        counts = {"tests": len(tests), "errors": 0, "failures": sum(test.find("failure") is not None for test in tests)}
+        counts["skipped"] = sum(test.find("skipped") is not None for test in tests)
         found += [f"{key} {suite.get(key)}" for key, count in counts.items() if int(suite.get(key, "0")) != count]
         if suite.find("properties") is not None and suite[0].tag != "properties":
             found.append("properties behind tests")

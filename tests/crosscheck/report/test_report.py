@@ -19,12 +19,15 @@ from crosscheck.running.plan import plan
 from tests.crosscheck.report.reading import data_of, series_of
 from tests.crosscheck.sessions import CASE, PROVIDER, copy_case, sweep_here, versus
 
-MIXED = versus("fine", "stepper", "absent", "diverger", goals='"marker:tip.position" = 1e-6, "load" = 1e-6') + """
+MIXED = (
+    versus("fine", "stepper", "absent", "diverger", goals='"marker:tip.position" = 1e-6, "load" = 1e-6')
+    + """
 [[chart]]
 observable = "marker:tip.position"
 variants = ["rigid"]
 reference = "rigid"
 """
+)
 FOREIGN = re.compile(r"""(?:src|href)\s*=\s*["'](?!#)|@import|url\(""")
 
 
@@ -108,7 +111,7 @@ def test_verdicts_json(mixed: tuple[SessionOutcome, Path]) -> None:
     assert len(verdicts) == len(mixed[0].all)
     needed = {"case", "channel", "engine_a", "engine_b", "level", "status", "expected", "E", "U", "goal", "reason"}
     assert needed <= set(verdicts[0])
-    assert all(not each["ok"] for each in verdicts if each["status"] != "agree")
+    assert all(not verdict["ok"] for verdict in verdicts if verdict["status"] != "agree")
 
 
 def test_junit_counts_nothing_as_passed_that_did_not_run(mixed: tuple[SessionOutcome, Path]) -> None:

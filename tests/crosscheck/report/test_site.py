@@ -100,7 +100,7 @@ def test_few_stops_of_the_tabulator(written: tuple[SessionOutcome, Path]) -> Non
 def test_a_block_says_its_worst(written: tuple[SessionOutcome, Path]) -> None:
     verdicts = written[0].verdicts["pendulum/single"]
     for block in comparison_blocks(verdicts):
-        inside = [each for each in verdicts if each.kind == "comparison" and each.comparison == block.title]
+        inside = [verdict for verdict in verdicts if verdict.kind == "comparison" and verdict.comparison == block.title]
         assert len(block.lines) == len(inside)
         assert block.open == any(not each.ok for each in inside)
         judged = [each.E / each.goal for each in inside if each.E is not None]

@@ -90,7 +90,8 @@ def test_an_approximation_is_no_reference_however_certain_it_is(records: list[Re
 def with_stored(records: list[Record], uncertainty: float, shift: float = 0.0, **changes: object) -> list[Record]:
     """The records with a stored reference: every second sample of the finest run of "fine", all shifted alike."""
     fine = max(
-        (each for each in records if isinstance(each, RunRecord) and each.engine == "fine"), key=lambda run: run.rung
+        (record for record in records if isinstance(record, RunRecord) and record.engine == "fine"),
+        key=lambda run: run.rung,
     )
     stored = RecordedReference(
         variant="rigid", asked={"fine": ReferenceGoals(goals={"marker": 1e-6})}, times=pack(unpack(fine.times)[::2]),
@@ -98,7 +99,7 @@ def with_stored(records: list[Record], uncertainty: float, shift: float = 0.0, *
         routes=("exact.py, a closed form", "fine, rk4 h=0.1, rk4 h=0.05"),
     )  # fmt: skip
     stored = replace(stored, **changes)
-    return [replace(each, reference=stored) if isinstance(each, CaseRecord) else each for each in records]
+    return [replace(record, reference=stored) if isinstance(record, CaseRecord) else record for record in records]
 
 
 def test_a_certain_stored_reference_judges_all_runs_the_most_certain_too(records: list[Record]) -> None:

@@ -284,7 +284,7 @@ def test_coarse_efforts_store_what_is_kept_and_those_that_uncertainties_need_eve
     full = set(found[-1].channels)
     assert len(full) > 5
     assert [set(each.channels) for each in found] == [{TIP}, *4 * [full]]
-    assert [set(each.channels) for each in records(Actor())][:2] == [set(), full]
+    assert [set(record.channels) for record in records(Actor())][:2] == [set(), full]
     assert module.FULLY_STORED == RUNGS
     assert all(np.array_equal(unpack(each.times), TIMES) for each in found)
 
@@ -349,11 +349,11 @@ def test_a_run_that_ended_at_once_has_no_times() -> None:
 def test_a_short_run_is_repeated_and_its_shortest_time_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     times = (0.03, 0.01, 0.02)
     actor = Actor(play=lambda run, count: slow(run, times[count % 3]))
-    assert [each.wall_s for each in records(actor)] == [0.01] * 5
+    assert [record.wall_s for record in records(actor)] == [0.01] * 5
     assert len(actor.heard) == 5 + 1 + 3 * 5
     less_short = Actor(play=lambda run, count: slow(run, 0.05 + 0.01 * (count % 2)))
     on_a_clock(monkeypatch, 0.06)
-    assert [each.wall_s for each in records(less_short)] == [0.05] * 5
+    assert [record.wall_s for record in records(less_short)] == [0.05] * 5
     assert len(less_short.heard) == 5 + 1 + 2 * 5
 
 
@@ -366,7 +366,7 @@ def test_of_the_coarsest_of_long_runs_the_beginning_is_run_twice(monkeypatch: py
         return slow(run, 0.1)
 
     actor = Actor(play=play)
-    assert [each.wall_s for each in records(actor, times=np.linspace(0.0, 0.2, 31))] == [0.1] * 5
+    assert [record.wall_s for record in records(actor, times=np.linspace(0.0, 0.2, 31))] == [0.1] * 5
     assert lengths == [4, 31, 4, 31, 31, 31, 31]
 
 

@@ -65,7 +65,7 @@ def test_a_flexible_body_sags() -> None:
     resting = at_rest(scene)
     assert any(abs(value) > 0.0 for state in resting.modal_states for value in state.coordinates)
     markers = engine("native").compile(resting).evaluate().markers
-    assert max(np.abs(each.acceleration).max() for each in markers.values()) <= 1e-7
+    assert max(np.abs(marker.acceleration).max() for marker in markers.values()) <= 1e-7
 
 
 def test_what_changes_with_time_does_not_rest() -> None:
@@ -86,7 +86,7 @@ def test_a_variant_in_its_equilibrium_is_another_model_and_a_fault_has_its_own()
     assert scene_digest(case, variant) != scene_digest(case, plain)
     assert variant_scene(case.scene(plain), plain) == case.scene(plain)
     _, jobs = plan(case, (), "none:none")
-    elbows = {job.role: next(each for each in job.scene.hinges if each.name == "elbow").rotation for job in jobs}
+    elbows = {job.role: next(hinge for hinge in job.scene.hinges if hinge.name == "elbow").rotation for job in jobs}
     angles = {role: rotation.angle_rad for role, rotation in elbows.items()}
     assert len({round(angle, 9) for angle in angles.values()}) == len(angles)
     assert all(rotation.rate_rad_s == 0.0 for rotation in elbows.values())

@@ -75,8 +75,8 @@ def test_standard_errors_are_those_of_repeated_sweeps() -> None:
         [each.sd for each in found],
         *([each.quantiles[p] for each in found] for p in ("0.05", "0.5", "0.95")),
     ):
-        scatter = np.std([each.value for each in estimates])
-        assert np.mean([each.standard_error for each in estimates]) == pytest.approx(scatter, rel=0.15)
+        scatter = np.std([estimate.value for estimate in estimates])
+        assert np.mean([estimate.standard_error for estimate in estimates]) == pytest.approx(scatter, rel=0.15)
 
 
 def test_few_samples_have_no_errors_that_they_cannot_have() -> None:
@@ -123,8 +123,8 @@ def test_paths_reach_every_station_and_whole_numbers_stay_whole() -> None:
     elements = Values(path="bodies.rod.elements", values=(4.0, 4.5))
     both = sweep(None, parameters=(stiffness, elements))
     changed = with_values(scene, both, (1.5, 4.0))
-    assert [each.EIy_Nm2 for each in changed.bodies[0].stations] == [
-        1.5 * each.EIy_Nm2 for each in scene.bodies[0].stations
+    assert [station.EIy_Nm2 for station in changed.bodies[0].stations] == [
+        1.5 * station.EIy_Nm2 for station in scene.bodies[0].stations
     ]
     assert changed.bodies[0].elements == 4 and isinstance(changed.bodies[0].elements, int)
     with pytest.raises(CaseError, match=r"4.5 is not a whole number"):

@@ -139,8 +139,8 @@ def test_samples_without_a_result_are_counted_and_listed_and_no_part_of_the_stat
     file = write(tmp_path, "fine", "crasher", "diverger", head=grid, parameter=mass)
     summary = summarise(run(file, tmp_path / "out", scheduler=run_jobs, limits=Limits(workers=2)))
     assert summary.statuses == {"finished": 1, "crashed": 1, "diverged": 1, "failed": 3}
-    assert [(each.engine, each.count) for each in summary.distributions] == [("fine", 1)]
-    messages = {(each.sample, each.engine): each.message for each in summary.failures}
+    assert [(distribution.engine, distribution.count) for distribution in summary.distributions] == [("fine", 1)]
+    messages = {(failure.sample, failure.engine): failure.message for failure in summary.failures}
     assert "exit code 139" in messages[0, "crasher"]
     assert "diverged" in messages[0, "diverger"] or "the step fell below" in messages[0, "diverger"]
     assert all("mass_kg" in messages[1, engine] for engine in ("fine", "crasher", "diverger"))

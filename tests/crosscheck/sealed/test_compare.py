@@ -120,7 +120,7 @@ def test_a_session_that_is_green_no_more_is_worse() -> None:
 def test_times_are_told_and_judge_nothing() -> None:
     slow = SealedRun(status="finished", effort="rk4 h=0.1", wall_s=4.0)
     found = compare_results(made(), made(run=slow))
-    assert (found.regressed, [each.ratio for each in found.times]) == (False, [4.0])
+    assert (found.regressed, [time.ratio for time in found.times]) == (False, [4.0])
     assert compare_results(made(), made(run=REPLACE(slow, effort="rk4 h=0.05"))).times == ()
     assert compare_results(made(), made(run=REPLACE(slow, wall_s=1.2))).times == ()
 
@@ -319,7 +319,7 @@ def test_the_badge_tells_the_outcome(session: tuple[Session, SessionOutcome, Pat
     assert json.loads(badge_json(red))["color"] == "red"
     assert json.loads(badge_json(SessionOutcome({}, [])))["message"] == "nothing compared"
     lost = SessionOutcome(outcome.verdicts, [], broken=("a line",))
-    assert json.loads(badge_json(lost)) ["message"] == "incomplete"
+    assert json.loads(badge_json(lost))["message"] == "incomplete"
 
 
 def test_the_badge_is_a_picture(session: tuple[Session, SessionOutcome, Path]) -> None:

@@ -152,7 +152,7 @@ GOOD = Verdict(
 
 def shown_lines(*verdicts: Verdict, made_with: str = "flexmb 1.2, AMD", verbosity: Verbosity = Verbosity.NORMAL) -> str:
     screen = io.StringIO()
-    cases = {each.case: [one for one in verdicts if one.case == each.case] for each in verdicts}
+    cases = {verdict.case: [one for one in verdicts if one.case == verdict.case] for verdict in verdicts}
     outcome = SessionOutcome(verdicts=cases, absences=[], made_with=made_with)
     print_outcome(Console(file=screen, width=80), outcome, verbosity)
     return screen.getvalue()

@@ -93,7 +93,7 @@ def race(case: Case, *engines: str, accuracy: float = 1e-4, rounds: int = 2) -> 
 
 
 def by_engine(found: CaseBench) -> dict[str, Contest]:
-    return {each.rival.job.engine: each for each in found.contests}
+    return {contest.rival.job.engine: contest for contest in found.contests}
 
 
 def job(case: Case, engine: str) -> Job:
@@ -214,11 +214,11 @@ def test_a_chart_has_errors_floor_failures_and_settings(case: Case, turns_here: 
     (data,) = found.charts
     assert data.observable == "marker:tip.position"
     assert 0.0 < data.floor < 1e-5
-    fine = [each for each in data.points if each.engine == "fine"]
+    fine = [point for point in data.points if point.engine == "fine"]
     assert len(fine) >= 3
     assert [each.error for each in fine] == sorted((each.error for each in fine), reverse=True)
-    assert all(each.error is None and each.message for each in data.points if each.engine in ("refuser", "absent"))
-    assert any(each.best for each in data.points)
+    assert all(point.error is None and point.message for point in data.points if point.engine in ("refuser", "absent"))
+    assert any(point.best for point in data.points)
     page = write_case(found, tmp_path)
     text = page.read_text(encoding="utf-8")
     assert "SciPy&#39;s DOP853, nothing else." in text
@@ -269,7 +269,7 @@ def test_what_a_turn_emits(case: Case) -> None:
     assert isinstance(prepared, CompileTimes) and prepared.again_s > 0.0
     assert isinstance(first, FirstSolve) and "marker:tip.position" in first.channels
     assert isinstance(samples, list) and len(samples) == 3
-    assert all(isinstance(each, Sample) and each.call_s > 0.0 for each in samples)
+    assert all(isinstance(sample, Sample) and sample.call_s > 0.0 for sample in samples)
     assert isinstance(failure, TurnFailure) and "why" in failure.message
 
 

@@ -85,7 +85,7 @@ def test_the_same_question_has_the_same_answer(gentle: tuple[fm.Scene, Advice]) 
 def test_costs_are_counted_operations(gentle: tuple[fm.Scene, Advice]) -> None:
     scene, advice = gentle
     bench = Bench(scene, T_END, advice.quantities)
-    model = tuple((each.body, each.rung) for each in advice.bodies)
+    model = tuple((body.body, body.rung) for body in advice.bodies)
     outcome = bench.run(model, advice.method)
     assert outcome.operations == advice.operations
     assert outcome.operations == outcome.evaluations * bench.operations(model, advice.method.algorithm)
@@ -153,7 +153,7 @@ def test_rigid_scenes_get_their_method() -> None:
 
 def test_what_is_advised_is_what_was_measured(gentle: tuple[fm.Scene, Advice]) -> None:
     scene, advice = gentle
-    assert advice.scene == built(scene, tuple((each.body, each.rung) for each in advice.bodies))
+    assert advice.scene == built(scene, tuple((body.body, body.rung) for body in advice.bodies))
     assert advice.uncertainty < advice.measured <= advice.tolerance
 
 
@@ -161,7 +161,7 @@ def test_bodies_are_chosen_one_by_one() -> None:
     """A stiff arm carries a soft one: only the soft one needs to bend."""
     scene = stiff_and_soft(1.0, 0.8)
     advice = advise(scene, 5e-3, t_end=1.0)
-    chosen = {each.body: each.rung for each in advice.bodies}
+    chosen = {body.body: body.rung for body in advice.bodies}
     assert chosen["arm"] == BodyModel("rigid")
     assert chosen["whip"] != BodyModel("rigid")
     assert advice.measured <= advice.tolerance

@@ -64,7 +64,7 @@ def test_nothing_costs_less_than_half_of_what_is_advised(tolerance: float) -> No
 
 
 def answer(advice: Advice) -> tuple[dict[str, BodyModel], object, int]:
-    return {each.body: each.rung for each in advice.bodies}, advice.method, advice.evaluations
+    return {body.body: body.rung for body in advice.bodies}, advice.method, advice.evaluations
 
 
 def test_the_order_of_bodies_changes_nothing() -> None:
@@ -82,7 +82,7 @@ def test_a_mechanism_that_is_locked_is_refused_with_the_reason(drive: s.Function
     scene = mechanisms.tilted_four_bar(flexible=False, drive=drive)
     advice = advise(scene, 1e-2, "energy.total@1", t_end=0.1)
     assert not advice.accepted and advice.scene is None
-    assert 'closure' in advice.refusal and '"c"' in advice.refusal and "the mechanism is locked" in advice.refusal
+    assert "closure" in advice.refusal and '"c"' in advice.refusal and "the mechanism is locked" in advice.refusal
 
 
 def test_what_locks_without_flexibility_has_no_rigid_run_and_that_is_said() -> None:

@@ -62,7 +62,7 @@ def test_stretch_and_shear_are_those_of_families_and_theory() -> None:
     with pytest.raises(ValueError, match="no stretch or shear"):
         built(scene, (("arm", stretching),))
     modes = fm.Modes(count=3, families=("axial", "bending_y"))
-    section = tuple(replace(each, GAy_N=1e6, GAz_N=1e6) for each in scene.bodies[0].stations)
+    section = tuple(replace(station, GAy_N=1e6, GAz_N=1e6) for station in scene.bodies[0].stations)
     soft = replace(scene, bodies=(replace(scene.bodies[0], theory="timoshenko", modes=modes, stations=section),))
     assert any(rung.stretching for rung in rungs(soft, soft.bodies[0], frozenset()))
     strains = built(soft, (("arm", stretching),)).bodies[0].modes.polynomials

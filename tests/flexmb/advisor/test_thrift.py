@@ -77,7 +77,7 @@ def test_no_step_is_longer_than_the_interval_of_the_output() -> None:
         assert len(set(ladder)) == len(ladder)
         steps = [method.value for method in ladder if not method.adaptive]
         assert all(step <= 0.02 for step in steps) and sorted(steps, reverse=True) == steps
-    every = {each[0].integrator: each for each in ladders(50.0, 0.5, "articulated", True, 0.02)}
+    every = {ladder[0].integrator: ladder for ladder in ladders(50.0, 0.5, "articulated", True, 0.02)}
     alpha = every["generalised_alpha"]
     assert alpha[0].value == pytest.approx(0.02) and alpha[1].value == pytest.approx(0.02 * STEPS[1] / STEPS[0])
 

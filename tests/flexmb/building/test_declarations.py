@@ -71,7 +71,7 @@ def test_freedoms_have_the_coordinates_of_the_kind(item):
     kind = catalogue.kind_of(item)[0]
     sizes = [freedom.sizes for freedom in item.freedoms]
     assert (sum(q for q, _ in sizes), sum(u for _, u in sizes)) == (kind.coordinates, kind.speeds)
-    scalars = [(each.name, each.coordinate) for each in item.freedoms if isinstance(each, ScalarFreedom)]
+    scalars = [(freedom.name, freedom.coordinate) for freedom in item.freedoms if isinstance(freedom, ScalarFreedom)]
     assert scalars == list(coordinates(item))
 
 

@@ -111,7 +111,7 @@ class Bennett:
         """Of A - B at the start (rad/s), by which it never stops."""
         around = np.linspace(0.0, 2.0 * np.pi, 400)
         weight = self.energies(around)[1]
-        kinetic, start = (float(each[0]) for each in self.energies(np.array([self.difference])))
+        kinetic, start = (float(energy[0]) for energy in self.energies(np.array([self.difference])))
         moves = self.speed**2 * float(np.sum(self.mass)) * self.a**2 + 1.5 * (np.max(weight) - start)
         return np.sqrt(moves / kinetic)
 
@@ -137,7 +137,7 @@ class Bennett:
     def scene(self) -> s.Scene:
         """Cut at its fourth axis."""
         made = SceneBuilder("Bennett", gravity=tuple(self.gravity))
-        angles, rates = (each[:, 0] for each in self.angles(np.array([self.difference])))
+        angles, rates = (angle[:, 0] for angle in self.angles(np.array([self.difference])))
         names = ("one", "two", "three")
         for k, name in enumerate(names):
             half = 0.5 * self.twists[k]

@@ -65,8 +65,8 @@ def lighter(scene: s.Scene, names: tuple[str, ...], ratio: float) -> s.Scene:
         inertia = tuple(tuple(ratio * each for each in row) for row in body.inertia_kg_m2)
         return msgspec.structs.replace(body, mass_kg=ratio * body.mass_kg, inertia_kg_m2=inertia)
 
-    assert set(names) <= {each.name for each in scene.bodies if isinstance(each, s.RigidBody)}
-    bodies = tuple(light(each) if each.name in names else each for each in scene.bodies)
+    assert set(names) <= {body.name for body in scene.bodies if isinstance(body, s.RigidBody)}
+    bodies = tuple(light(body) if body.name in names else body for body in scene.bodies)
     return msgspec.structs.replace(scene, bodies=bodies)
 
 

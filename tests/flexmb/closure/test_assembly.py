@@ -18,7 +18,7 @@ from tests.flexmb.closure import mechanisms as m
 
 
 def gap(system: flexmb.System, state: flexmb.State) -> float:
-    return max(max(each) for each in system.closure_gaps(state).values())
+    return max(max(gap) for gap in system.closure_gaps(state).values())
 
 
 def largest_gap(system: flexmb.System, run: flexmb.Trajectory) -> float:

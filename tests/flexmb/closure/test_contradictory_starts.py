@@ -28,7 +28,7 @@ from tests.flexmb.closure.coupled import HINGES
 SMALL = {"prescribed": False, "wheels": 1, "point_masses": 1, "deformation": 0.05}
 LEVELS = (trees.FULL, trees.LINEAR, trees.EXACT, trees.STIFFENED, trees.EVERY_LEVEL)
 LOOPS = [replace(recipe, **SMALL, bodies=7, hinges=HINGES) for recipe in LEVELS]
-CHAINS = [replace(each, bodies=4, branching=False, hinges=("revolute", "universal", "prismatic")) for each in LOOPS]
+CHAINS = [replace(loop, bodies=4, branching=False, hinges=("revolute", "universal", "prismatic")) for loop in LOOPS]
 
 
 def drawn(seed: int) -> s.Scene:
@@ -60,7 +60,7 @@ def contradicting(scene: s.Scene, rng: np.random.Generator, *, shift: bool) -> s
     )
     if not shift:
         return msgspec.structs.replace(scene, hinges=hinges)
-    places = [np.array(each.position_b_m) + trees.vector(rng, 0.005) for each in scene.closures]
+    places = [np.array(closure.position_b_m) + trees.vector(rng, 0.005) for closure in scene.closures]
     pairs = zip(scene.closures, places, strict=True)
     closures = tuple(msgspec.structs.replace(each, position_b_m=tuple(place)) for each, place in pairs)
     return msgspec.structs.replace(scene, hinges=hinges, closures=closures)
@@ -106,7 +106,7 @@ def _gap_by_hinges(scene: s.Scene, given: np.ndarray, guess: np.ndarray, hinges:
         q = given.copy()
         q[hinges] = x
         motion = Motions(q, np.zeros((1, dense.nu)), np.zeros((1, dense.nu)))
-        return np.concatenate([rows(dense, each, motion)[0, 0] for each in scene.constraints])
+        return np.concatenate([rows(dense, constraint, motion)[0, 0] for constraint in scene.constraints])
 
     starts = (given[hinges], guess)
     return min(float(np.linalg.norm(least_squares(gaps, x, xtol=1e-15, ftol=1e-15).fun)) for x in starts)

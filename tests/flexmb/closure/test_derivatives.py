@@ -49,31 +49,33 @@ def small_direction(system: Any, seed: int) -> tuple[Any, Any]:
 def values(system: Any, state: fm.State) -> dict[str, Any]:
     """What is observed by names, without drives and orientations."""
     found = system.evaluate(state.t, state.q, state.u)
-    markers = {name: np.r_[each.position, each.velocity, each.acceleration] for name, each in found.markers.items()}
+    markers = {
+        name: np.r_[marker.position, marker.velocity, marker.acceleration] for name, marker in found.markers.items()
+    }
     return {
         "accelerations": found.accelerations, "momentum": found.momentum, "energy": np.array([*found.energy.values()]),
         **markers, **found.loads, **found.wheel_loads, **found.connectors, **found.hinge_forces,
-        **{f"drive {name}": each for name, each in found.drives.items()},
+        **{f"drive {name}": drive for name, drive in found.drives.items()},
     }  # fmt: skip
 
 
 def changes(d: Any, of: Any) -> dict[str, Any]:
     """`of` the records of derivatives, by the same names."""
     markers = {
-        name: np.concatenate([of(each.position), of(each.velocity), of(each.acceleration)])
-        for name, each in d.markers.items()
+        name: np.concatenate([of(marker.position), of(marker.velocity), of(marker.acceleration)])
+        for name, marker in d.markers.items()
     }
     energy = np.array([of(each) for each in d.energy.values()])
     groups = {**d.loads, **d.wheel_loads, **d.connectors, **d.hinge_forces}
-    drives = {f"drive {name}": of(each) for name, each in d.drives.items()}
+    drives = {f"drive {name}": of(drive) for name, drive in d.drives.items()}
     return {
         "accelerations": of(d.accelerations), "momentum": of(d.momentum), "energy": energy, **markers,
-        **{name: of(each) for name, each in groups.items()}, **drives,
+        **{name: of(group) for name, group in groups.items()}, **drives,
     }  # fmt: skip
 
 
 # Accelerations of 1e8 leave nothing of the differences of what hardly moves.
-@pytest.mark.parametrize("name", [each for each in NAMES if "11, light 1e-08" not in str(each)])
+@pytest.mark.parametrize("name", [name for name in NAMES if "11, light 1e-08" not in str(name)])
 def test_along_what_the_closures_allow(name: str) -> None:
     """States are displaced, and put back on the closures: what they really change by is differenced, too."""
     system, state, rates, d = asked(name)

@@ -167,7 +167,7 @@ def test_twice_the_loops_cost_twice_as_much(all_at_once):
     two, four = (four_bars(n, kind="spherical") for n in (2, 4))
     assert operations(compiled(four)) == pytest.approx(2 * operations(compiled(two)), rel=0.02)
     rows = [system.closures.constants[1] for system in (compiled(two), compiled(four))]
-    assert [len(each.column) for each in rows] == [6, 12]
+    assert [len(row.column) for row in rows] == [6, 12]
     sizes = [closure_system.workspace(own, system.constants, system.nq).half.size
              for own, system in zip(rows, (compiled(two), compiled(four)), strict=True)]  # fmt: skip
     assert sizes == [18, 36]

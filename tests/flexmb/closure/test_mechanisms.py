@@ -114,7 +114,7 @@ def test_loads_of_an_overconstrained_loop_say_what_is_determined():
     in_plane = [False, False, True, True, True, False]
     assert {name: each.tolist() for name, each in determined.items()} == dict.fromkeys(determined, in_plane)
     flexible = flexmb.compile(m.four_bar(modes=2))
-    assert all(np.all(each) for each in flexible.determined_loads(flexible.initial_state).values())
+    assert all(np.all(load) for load in flexible.determined_loads(flexible.initial_state).values())
 
 
 def test_bennetts_linkage_moves():

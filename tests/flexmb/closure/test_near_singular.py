@@ -36,13 +36,13 @@ def outcomes(seed: int, settings: tuple[str, ...]) -> dict[str, str]:
     system = flexmb.compile(row.scene())
     feet = [system.coordinate(f"foot {i}").start for i in range(len(row.uprights))]
     found = {}
-    for each in settings:
-        given, tolerance = SETTINGS[each]
+    for setting in settings:
+        given, tolerance = SETTINGS[setting]
         run = flexmb.simulate(system, TIMES[-1], samples=TIMES, **given)
         bound = tolerance + 300.0 * drift
-        if "rk4" in each:  # a step too coarse for the motion anywhere shows in its energy, and spoils its time
+        if "rk4" in setting:  # a step too coarse for the motion anywhere shows in its energy, and spoils its time
             bound += 20.0 * lost_energy(run, row.kinetic) * float(np.max(np.abs(row.rates)))
-        found[each] = judged(run, run.q[:, feet], angles[: len(run.t), : len(feet)], bound)
+        found[setting] = judged(run, run.q[:, feet], angles[: len(run.t), : len(feet)], bound)
     return found
 
 
@@ -52,15 +52,15 @@ def bennett_outcomes(seed: int, settings: tuple[str, ...]) -> dict[str, str]:
     times, angles = linkage.motion(5.2, 14)
     system, found = flexmb.compile(linkage.scene()), {}
     fastest = float(np.max(np.abs(np.diff(angles, axis=0) / np.diff(times)[:, None])))
-    for each in settings:
-        given, tolerance = SETTINGS[each]
+    for setting in settings:
+        given, tolerance = SETTINGS[setting]
         if "step" in given:
             given = given | {"step": given["step"] * 6.0 / fastest}
         run = flexmb.simulate(system, times[-1], samples=times, **given)
         bound = tolerance * max(fastest * times[-1], 1.0)
-        if "rk4" in each:
+        if "rk4" in setting:
             bound += 10.0 * lost_energy(run, linkage.kinetic) * fastest * times[-1]
-        found[each] = judged(run, run.q, angles[: len(run.t)], bound)
+        found[setting] = judged(run, run.q, angles[: len(run.t)], bound)
     return found
 
 
@@ -107,7 +107,7 @@ def test_random_mechanisms_are_right_or_lost(of, count):
     `UNRESOLVED` / 16 lost five runs of 99, times 16 made two wrong; crossings feign up to 2 of it, near misses have 0.2
     and more. `FASTEST` / 8 lost one, times 512 none; pivots of crossings fall by 0.5 at most.
     """
-    counts: dict[str, dict[str, int]] = {each: {} for each in SETTINGS}
+    counts: dict[str, dict[str, int]] = {setting: {} for setting in SETTINGS}
     wrong = []
     for seed in range(count):
         for settings, found in of(seed, tuple(SETTINGS)).items():

@@ -64,7 +64,7 @@ def check(seed: int, kinds: tuple[str, ...] = loops.KINDS) -> None:
         assert np.array_equal(determined[closure.name][clear], share[clear] < 1e-10), closure
     by_dense = open_loads(DenseSystem(scene), state.q, ~dense.free)
     assert {name for name, each in determined.items() if not each.all()} == {
-        name for name, each in by_dense.loads.items() if each.any()
+        name for name, load in by_dense.loads.items() if load.any()
     }
 
 
@@ -115,7 +115,7 @@ def test_rows_that_are_compared_with_noise_are_noticed(monkeypatch):
 
     def by_own_rows(t, y, chain):
         status = linearise(t, y, chain)
-        rows = np.concatenate([np.linalg.norm(each.half, axis=1) for each in blocks(chain.cc, chain.cw)])
+        rows = np.concatenate([np.linalg.norm(block.half, axis=1) for block in blocks(chain.cc, chain.cw)])
         own = chain.cc.weight * rows
         for closure in chain.cc.closure:
             rows = slice(closure["row_start"], closure["row_stop"])

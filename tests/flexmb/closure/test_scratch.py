@@ -58,7 +58,7 @@ LASTS_IN_TREES = {"port", "ground", "displaced"}
 
 def test_every_field_is_scratch_or_found_or_kept() -> None:
     """A new one has to be decided about."""
-    assert {each.name for each in fields(ClosureWorkspace)} == SCRATCH | FOUND | KEPT
+    assert {field.name for field in fields(ClosureWorkspace)} == SCRATCH | FOUND | KEPT
     assert len(SCRATCH) + len(FOUND) + len(KEPT) == len(fields(ClosureWorkspace))
 
 
@@ -98,8 +98,8 @@ def poison(table: Any) -> None:
     """Set all real numbers of an array, a table or a bundle to NaN, but for the speeds that a run remembers, and for
     zeros: whole vectors are read of what has fewer entries, and the rest is zero."""
     if is_dataclass(table):
-        for each in fields(table):
-            poison(getattr(table, each.name))
+        for field in fields(table):
+            poison(getattr(table, field.name))
     elif table.dtype.names:
         for name in table.dtype.names:
             if name != "former_speed":

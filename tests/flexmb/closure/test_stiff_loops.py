@@ -15,7 +15,7 @@ from tests.bounds import observed_order
 from tests.flexmb.closure import mechanisms as m
 from tests.flexmb.closure.test_jacobian import connected
 
-STIFF = [name for name, each in INTEGRATORS.items() if each.linearises]
+STIFF = [name for name, integrator in INTEGRATORS.items() if integrator.linearises]
 ADAPTIVE = [name for name in STIFF if not INTEGRATORS[name].fixed]
 STEEL = beam_section(E=2e11, G=8e10, A=1e-4, Iy=8e-10, Iz=8e-10, rho=7800.0)
 
@@ -109,8 +109,7 @@ def test_no_tolerance_takes_much_more_work_than_others(name, method):
     scene, t_end = CURVES[name][0](), CURVES[name][1]
     system = fm.compile(scene)
     runs = [
-        fm.simulate(system, t_end, method, rtol=rtol, atol=1e-2 * rtol, samples=2)
-        for rtol in np.logspace(-3, -7, 60)
+        fm.simulate(system, t_end, method, rtol=rtol, atol=1e-2 * rtol, samples=2) for rtol in np.logspace(-3, -7, 60)
     ]
     assert all(run.finished for run in runs)
     assert np.max(excess(np.array([run.statistics.evaluations for run in runs]))) < 3.0

@@ -42,7 +42,7 @@ def test_springs_conserve_energy(flight):
 
 def test_smooth_ones_to_the_integrators_error():
     scene = free_flying()
-    smooth = tuple(each for each in scene.connectors if each.name not in KINKED)
+    smooth = tuple(connector for connector in scene.connectors if connector.name not in KINKED)
     run = fm.simulate(msgspec.structs.replace(scene, connectors=smooth), END, **EXACT)
     assert np.ptp(run.energy["spring"]) > 1.0
     assert np.max(np.abs(run.energy_drift)) <= BALANCED * run.energy_scale
@@ -71,7 +71,8 @@ def test_a_lost_reaction_would_be_noticed(flight):
     """Negative control: one connector of the same law, but from the ground."""
     scene = free_flying()
     changed = tuple(
-        msgspec.structs.replace(each, body_a="ground") if each.name == "spring" else each for each in scene.connectors
+        msgspec.structs.replace(connector, body_a="ground") if connector.name == "spring" else connector
+        for connector in scene.connectors
     )
     run = fm.simulate(msgspec.structs.replace(scene, connectors=changed), END, **EXACT)
     assert np.max(np.abs(run.momentum_drift)) > 1e-3 * np.max(np.abs(flight.momentum[0]))

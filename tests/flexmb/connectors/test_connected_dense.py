@@ -94,11 +94,11 @@ def test_operators_have_the_same_accelerations(at_start):
     assert left_over(dense, state, found) <= gamma(64 * dense.nu)
 
 
-@pytest.mark.parametrize("name", [each.name for each in everything().connectors if each.name != "slack"])
+@pytest.mark.parametrize("name", [connector.name for connector in everything().connectors if connector.name != "slack"])
 def test_every_connector_counts(at_start, name):
     """Negative control: the equations of a scene without it are not fulfilled."""
     system, state, dense = at_start
-    without = [each for each in dense.scene.connectors if each.name != name]
+    without = [connector for connector in dense.scene.connectors if connector.name != name]
     other = DenseSystem(msgspec.structs.replace(dense.scene, connectors=tuple(without)))
     assert left_over(other, state, system.accelerations(state)) > 1e3 * gamma(8 * dense.nu)
 
@@ -112,7 +112,7 @@ def test_ruthless_bodies_take_no_connector_where_they_bend():
 def test_a_function_of_time_drives_an_actuator(at_start):
     """The ram's load less its damper's is its function's value, along the line from A to B."""
     system, state, dense = at_start
-    ram = next(each for each in dense.scene.connectors if each.name == "ram")
+    ram = next(connector for connector in dense.scene.connectors if connector.name == "ram")
     assert isinstance(ram.force_N, s.Sine)
     changed = []
     for t in (0.0, 0.7):

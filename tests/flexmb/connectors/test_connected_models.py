@@ -46,7 +46,7 @@ def test_a_beam_taken_apart_keeps_its_springs():
     whole.spring_damper("stay", "ground", beam.name, **stayed)
     apart = finite_segments(whole.scene(), beam.name, 4)
     stay = apart.connectors[0]
-    assert stay.body_b != beam.name and stay.body_b in {each.name for each in apart.bodies}
+    assert stay.body_b != beam.name and stay.body_b in {body.name for body in apart.bodies}
     loads = []
     for each in (whole.scene(), apart):
         system = fm.compile(each)

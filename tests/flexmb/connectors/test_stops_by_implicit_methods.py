@@ -6,7 +6,7 @@ import pytest
 import flexmb as fm
 from flexmb.integrate.catalogue import INTEGRATORS
 
-ADAPTIVE = [name for name, each in INTEGRATORS.items() if each.linearises and not each.fixed]
+ADAPTIVE = [name for name, integrator in INTEGRATORS.items() if integrator.linearises and not integrator.fixed]
 MASS, STIFFNESS, HEIGHT, G = 2.0, 1e6, 0.5, 9.81
 
 

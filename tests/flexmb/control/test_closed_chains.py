@@ -20,9 +20,7 @@ RUNS: dict[str, dict[str, Any]] = {
     "radau5": {"method": "radau5"}, "exponential": {"method": "exponential"},
 }  # fmt: skip
 PD = fm.StateSpace(name="law", inputs=("angle", "rate"), D=((-STIFFNESS, -DAMPING),))
-LAGGING = fm.StateSpace(
-    name="law", inputs=("angle", "rate"), A=((-1 / LAG,),), B=((1 / LAG, 0.2),), C=((-STIFFNESS,),)
-)
+LAGGING = fm.StateSpace(name="law", inputs=("angle", "rate"), A=((-1 / LAG,),), B=((1 / LAG, 0.2),), C=((-STIFFNESS,),))
 SAMPLED = msgspec.structs.replace(PD, period_s=0.05, delay_s=0.02)
 
 
@@ -41,10 +39,10 @@ def controlled(scene: fm.Scene, hinge: str, *parts: Any) -> fm.Scene:
     )  # fmt: skip
     kinds = fm.StateSpace | fm.Pid | fm.UserLaw | fm.GainTable
     return msgspec.structs.replace(
-        scene, hinges=hinges, controllers=tuple(each for each in parts if isinstance(each, kinds)),
+        scene, hinges=hinges, controllers=tuple(part for part in parts if isinstance(part, kinds)),
         sensors=(
             fm.CoordinateSensor(name="angle", of=hinge), fm.CoordinateSensor(name="rate", of=hinge, quantity="rate"),
-            *(each for each in parts if not isinstance(each, kinds)),
+            *(part for part in parts if not isinstance(part, kinds)),
         ),
     )  # fmt: skip
 
@@ -227,9 +225,9 @@ def test_a_controlled_chain_has_the_linear_model_of_its_motion() -> None:
     rest, moving = m.four_bar(gravity=0.0, rate=0.0), m.four_bar()
     hinges = tuple(
         msgspec.structs.replace(
-            each, rotation=msgspec.structs.replace(each.rotation, stiffness_Nm_rad=STIFFNESS)
-        ) if each.name == "drive" else each
-        for each in moving.hinges
+            hinge, rotation=msgspec.structs.replace(hinge.rotation, stiffness_Nm_rad=STIFFNESS)
+        ) if hinge.name == "drive" else hinge
+        for hinge in moving.hinges
     )  # fmt: skip
     proportional = fm.StateSpace(name="law", inputs=("angle", "rate"), D=((-STIFFNESS, 0.0),))
     spring = fm.linearize(msgspec.structs.replace(moving, hinges=hinges)).A

@@ -38,7 +38,7 @@ def seen():
     dense = DenseSystem(scene)
     q, u = dense.on_profile(run.q[0], run.u[0], 0.0)
     rates = dense.accelerations(0.0, q, u)
-    return scene, {name: each[0] for name, each in run.signals.items()}, q, u, rates, dense
+    return scene, {name: signal[0] for name, signal in run.signals.items()}, q, u, rates, dense
 
 
 def expected(quantity: str, frame: str, scene: fm.Scene, site) -> np.ndarray:

@@ -54,7 +54,7 @@ def _run(kernel: Any, term: Term | None, c: Constants, w: DerivativeWorkspace, *
     """The tables of the derivatives after a call; the constants say which features the scene has, and no more."""
     arguments = [constants(c), _counting(w.sweeps, float), _tables(w.tables)]
     if term is None:  # to leave a term out changes no index
-        arguments = [checked(each) for each in arguments]
+        arguments = [checked(argument) for argument in arguments]
     with np.errstate(all="ignore"):
         _Without(term)(kernel)(*arguments, *further)
     return arguments[2]
@@ -108,7 +108,7 @@ def _tables(d: Derivatives) -> Any:
     for field in fields(d):
         if field.name == "duals":
             copy.duals = SimpleNamespace(
-                **{each.name: _as_duals(getattr(d.duals, each.name)) for each in fields(d.duals)}
+                **{field.name: _as_duals(getattr(d.duals, field.name)) for field in fields(d.duals)}
             )
         else:
             setattr(copy, field.name, _counting(getattr(d, field.name), float))
@@ -199,8 +199,8 @@ class _Numbers:
     @staticmethod
     def elementary(function: Callable[..., float]) -> Callable[..., Any]:
         def of(*operands: Any) -> Any:
-            value = function(*(each.real for each in operands))
-            if not any(isinstance(each, Dual) for each in operands):
+            value = function(*(operand.real for operand in operands))
+            if not any(isinstance(operand, Dual) for operand in operands):
                 return value
             if function is math.atan2:
                 y, x = operands

@@ -39,7 +39,7 @@ class Term(NamedTuple):
 
 def modules() -> list[str]:
     """Names of the modules of the recursion but that of strained beams, which `test_strained.py` holds."""
-    return [each.name for each in pkgutil.iter_modules(derivatives.__path__) if each.name != "strained"]
+    return [module.name for module in pkgutil.iter_modules(derivatives.__path__) if module.name != "strained"]
 
 
 def terms(module: str) -> Iterator[Term]:

@@ -102,7 +102,7 @@ def test_constants_against_dual_numbers():
     x, row, moved = pulled.pull_workspace(c, plant.nq, plant.nu), np.zeros(len(y)), np.zeros(len(y))
     row[plant.nq : -1] = np.random.default_rng(1).normal(size=plant.nu)
     assert pulled.pull(T, y, row, moved, c, x) == Status.OK
-    found = np.concatenate([by_constants(x.p, c, each.constants) for each in parameters.blocks])[: len(BY_TABLES)]
+    found = np.concatenate([by_constants(x.p, c, block.constants) for block in parameters.blocks])[: len(BY_TABLES)]
     assert np.all(np.abs(row @ exact) > 1e-3)
     assert np.max(np.abs(found / (row @ exact) - 1.0)) < 1e-9
     for column in (STIFFNESS, DAMPING, REST, ARMATURE):

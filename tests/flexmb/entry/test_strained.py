@@ -57,7 +57,7 @@ def moving(of_beam: dict[str, Any], directions: int = LANES) -> Body:
     w.body["velocity"][0] = rng.normal(size=6)
     tables = duals(system.constants, system.nq, system.nu)
     names = tables.__dataclass_fields__
-    e = interpreted.checked(SimpleNamespace(**{each: interpreted._as_duals(getattr(tables, each)) for each in names}))
+    e = interpreted.checked(SimpleNamespace(**{name: interpreted._as_duals(getattr(tables, name)) for name in names}))
     first = int(system.constants.body["etad_index"][0])
     for i in range(6):
         e.body[0].velocity[i] += float(w.body["velocity"][0, i])

@@ -132,9 +132,9 @@ def unnoticed(of: list[Term]) -> list[str]:
 @pytest.mark.filterwarnings('ignore:scene "connected" is doubtful')
 def test_the_recursion_as_it_is_agrees():
     """Also interpreted, with the mass matrix and the power; a term is noticed far above that."""
-    for each in scenes():
-        limit = bound(each.system)
-        assert each.error(None) <= limit < 1e-2 * NOTICED
+    for scene in scenes():
+        limit = bound(scene.system)
+        assert scene.error(None) <= limit < 1e-2 * NOTICED
 
 
 @pytest.mark.filterwarnings('ignore:scene "connected" is doubtful')

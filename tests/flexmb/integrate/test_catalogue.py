@@ -21,11 +21,11 @@ from tests.repo.project import ROOT
 
 def test_names_for_type_checkers_are_those_of_the_catalogue():
     assert get_args(Method) == tuple(INTEGRATORS)
-    assert all(name == each.name for name, each in INTEGRATORS.items())
+    assert all(name == integrator.name for name, integrator in INTEGRATORS.items())
 
 
 def test_every_declaration_is_in_the_catalogue():
-    modules = [import_module(f"flexmb.integrate.{each.name}") for each in iter_modules(integrate.__path__)]
+    modules = [import_module(f"flexmb.integrate.{module.name}") for module in iter_modules(integrate.__path__)]
     declared = [each for module in modules for each in vars(module).values() if isinstance(each, Integrator)]
     assert len(declared) == len(INTEGRATORS)
     assert all(INTEGRATORS[each.name] is each for each in declared)
@@ -38,7 +38,10 @@ def test_the_table_of_the_documentation_says_the_same():
         name: (int(order), steps)
         for name, order, steps in re.findall(r"^\| `(\w+)` \| (\d+)[^|]* \| ([^|]+) \|", text, re.MULTILINE)
     }
-    said = {name: (each.order, "`step`" if each.fixed else "by rtol, atol") for name, each in INTEGRATORS.items()}
+    said = {
+        name: (integrator.order, "`step`" if integrator.fixed else "by rtol, atol")
+        for name, integrator in INTEGRATORS.items()
+    }
     assert rows == said
 
 

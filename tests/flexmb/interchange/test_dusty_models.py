@@ -81,8 +81,8 @@ def _with_noise(sid, rng):
         return replace(block, zero=zero)
 
     assert is_dataclass(sid)
-    changed = {each.name: noisy(getattr(sid, each.name)) for each in fields(sid)
-               if isinstance(getattr(sid, each.name), Taylor) and each.name not in ("AP",)}  # fmt: skip
+    changed = {field.name: noisy(getattr(sid, field.name)) for field in fields(sid)
+               if isinstance(getattr(sid, field.name), Taylor) and field.name not in ("AP",)}  # fmt: skip
     nodes = tuple(replace(node, origin=noisy(node.origin), phi=noisy(node.phi), psi=noisy(node.psi))
                   for node in sid.nodes)  # fmt: skip
     return replace(sid, nodes=nodes, **changed)

@@ -98,7 +98,9 @@ def test_blocks_that_contradict_each_other_are_noted_with_figures(block):
     sid = sid_of(made(*given))
     spoiled = Taylor(1.1 * getattr(sid, block).zero, getattr(sid, block).first)
     found = imported_sid(replace(sid, **{block: spoiled}), "made")
-    first = next(each for each in found.disagreements if PARTS[block] in each and block in each)
+    first = next(
+        disagreement for disagreement in found.disagreements if PARTS[block] in disagreement and block in disagreement
+    )
     assert "contradict each other, by" in first and first.endswith("is taken")
     at_rest = of_body(found.body, np.zeros(given[2].shape[2]))
     wanted = mass_matrix(*given, np.zeros(given[2].shape[2]))
@@ -125,7 +127,10 @@ def test_momentum_beyond_the_modal_mass_is_cut_for_level_ruthless():
     too_much = replace(sid, Ct=Taylor(3.0 * sid.Ct.zero, sid.Ct.first))
     found = imported_sid(too_much, "rod")
     assert found.body.level == "ruthless"
-    assert any(each.startswith("Ct and Me contradict") and "Me is taken" in each for each in found.disagreements)
+    assert any(
+        disagreement.startswith("Ct and Me contradict") and "Me is taken" in disagreement
+        for disagreement in found.disagreements
+    )
     M = of_body(found.body, np.zeros(5))
     assert relative(M[6:, 6:], sid.Me.zero) < 1e-9 and np.min(np.linalg.eigvalsh(M)) > 0.0
     assert relative(M[3:6, 6:], sid.Cr.zero.T) < 1e-9
@@ -146,10 +151,10 @@ def test_a_level_that_needs_changes_of_inertia_takes_near_masses_where_none_have
 
     found = imported_sid(spoiled(-1.0), "made", level)
     assert found.body.level == level
-    assert any(re.search(r"near masses, which have frequencies that are off by 0\.\d", each) for each in found.notes)
+    assert any(re.search(r"near masses, which have frequencies that are off by 0\.\d", note) for note in found.notes)
     at_rest = mass_matrix(*given, np.zeros(3))
     assert relative(of_body(found.body, np.zeros(3)), at_rest) < 1e-9
-    with pytest.raises(SidError, match="the limit is 0.25: .* level \"ruthless\""):
+    with pytest.raises(SidError, match='the limit is 0.25: .* level "ruthless"'):
         imported_sid(spoiled(4.0), "made", level)
 
 
@@ -183,7 +188,7 @@ def test_an_impossible_inertia_is_refused_or_repaired():
     with pytest.raises(SidError, match="mdCM and J.*flexmb import --repair"):
         imported_sid(wrong, "made")
     found = imported_sid(wrong, "made", repair=True)
-    assert any("J was changed by" in each for each in found.disagreements)
+    assert any("J was changed by" in disagreement for disagreement in found.disagreements)
     assert imported_sid(sid, "made", repair=True) == imported_sid(sid, "made")  # what is possible stays as it is
 
 

@@ -98,7 +98,7 @@ def test_limits_and_friction_become_connectors(tmp_path):
 
 def test_armatures_are_read_as_they_are(tmp_path):
     """Negative control of the comparison above: without them the mass matrix is another."""
-    hinges = {each.name: each for each in read(MODELS["armature of an actuator"], tmp_path).scene.hinges}
+    hinges = {hinge.name: hinge for hinge in read(MODELS["armature of an actuator"], tmp_path).scene.hinges}
     assert hinges["pitch"].rotation.armature_kg_m2 == pytest.approx(0.3 + 3.0**2 * 0.1, rel=1e-15)
     assert hinges["reach"].translation.armature_kg == 1.5
     assert hinges["roll"].rotation.armature_kg_m2 == 0.0

@@ -28,7 +28,7 @@ COUPLED = MJCF.replace(
 def test_equality_constraints_of_coordinates_are_couplings(tmp_path):
     """The equations without them, M a + bias = J' f, and J a = 0 exactly: MuJoCo itself keeps them softly."""
     model, data, system = compiled(COUPLED, read(COUPLED, tmp_path).scene)
-    assert [each.name for each in system.scene.couplings] == ["mesh", "equality 1"]
+    assert [coupling.name for coupling in system.scene.couplings] == ["mesh", "equality 1"]
     (q, u), theirs = random_motion(model, data, system)
     value, rate = ({name: x[at(name).start] for name in ("roll", "pitch", "reach", "twist")}
                    for x, at in ((q, system.coordinate), (u, system.speed)))  # fmt: skip

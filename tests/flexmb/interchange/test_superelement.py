@@ -222,7 +222,7 @@ def test_tied_surfaces_have_the_frequencies_of_craig_and_bampton(kind):
 
 
 def test_a_rigid_tie_is_the_elimination_of_its_surface():
-    K, M, position, dofs = solids.tied(SOLID_K, SOLID_M, SOLID_AT, [np.array(each) - 1 for each in SURFACES])
+    K, M, position, dofs = solids.tied(SOLID_K, SOLID_M, SOLID_AT, [np.array(surface) - 1 for surface in SURFACES])
     eliminated = reduced(super_element(K, M, position, dofs=dofs), [1, 2], 4)
     assert relative(tied(SOLID, [900, 901], surfaces("rigid"), 4).frequencies, eliminated.frequencies) < 1e-9
 

@@ -154,7 +154,7 @@ def test_frames_are_where_the_file_says(tmp_path):
         '<parent link="a"/><child link="b"/>'
         '<origin xyz="1 2 3" rpy="0.1 0.2 0.3"/><axis xyz="0 0 2"/></joint></robot>'
     )
-    (hinge,) = [each for each in read(text, tmp_path).scene.hinges if each.name == "j"]
+    (hinge,) = [hinge for hinge in read(text, tmp_path).scene.hinges if hinge.name == "j"]
     cx, sx, cy, sy, cz, sz = (f(a) for a in (0.1, 0.2, 0.3) for f in (np.cos, np.sin))
     turns = [
         np.array(each)
@@ -247,7 +247,8 @@ SINGLE = f'<robot name="r">{link("a", 1)}{link("b", 2)}{joint("j", "revolute", "
 BAD = {
     "mimic": (SINGLE.replace("<axis", '<mimic joint="k"/><axis'), 'joint "j": it mimics'),
     "mimic without multiplier": (
-        SINGLE.replace("<axis", '<mimic joint="j" multiplier="0"/><axis'), "its multiplier is zero",
+        SINGLE.replace("<axis", '<mimic joint="j" multiplier="0"/><axis'),
+        "its multiplier is zero",
     ),
     "mimic of itself": (SINGLE.replace("<axis", '<mimic joint="j" multiplier="2"/><axis'), "it mimics itself"),
     "mimic by a word": (SINGLE.replace("<axis", '<mimic joint="j" offset="one"/><axis'), "offset of its mimic element"),

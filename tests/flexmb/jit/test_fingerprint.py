@@ -237,11 +237,13 @@ def test_a_name_that_is_nowhere_is_refused():
 def dispatchers() -> tuple[set[FunctionType], set[FunctionType]]:
     """All kernels of the package, and all its helpers."""
     modules = [
-        importlib.import_module(each.name)
-        for each in pkgutil.walk_packages(flexmb.__path__, "flexmb.")
-        if not each.name.endswith("__main__") and not each.name.startswith("flexmb.bridges.")  # other libraries'
+        importlib.import_module(package.name)
+        for package in pkgutil.walk_packages(flexmb.__path__, "flexmb.")
+        if not package.name.endswith("__main__") and not package.name.startswith("flexmb.bridges.")  # other libraries'
     ]
-    found = {value for each in modules for value in vars(each).values() if isinstance(value, Dispatcher | FunctionType)}
+    found = {
+        value for module in modules for value in vars(module).values() if isinstance(value, Dispatcher | FunctionType)
+    }
     found = {value for value in found if hasattr(value, "py_func")}
     kernels = {each.py_func for each in found if isinstance(getattr(each, "_cache", None), KernelCache)}
     return kernels, {each.py_func for each in found} - kernels
@@ -334,7 +336,7 @@ def _counts(function: FunctionType) -> bool:
 
 def compiled_beyond(*kernels: Dispatcher) -> list[str]:
     """What numba compiled for these kernels in this process and their keys do not know; all of the room jit counts."""
-    known = {function for each in kernels for function in reached(each.py_func)}
+    known = {function for kernel in kernels for function in reached(kernel.py_func)}
     found = list[str]()
     for each in gc.get_objects():
         if isinstance(each, Dispatcher) and each.overloads and _counts(each.py_func):

@@ -56,7 +56,9 @@ def test_turns_without_a_check_of_the_scene():
         name="coil", length_m=1.0, elements=1, level="exact", modes=s.Modes(count=1), stations=tuple(stations(1.0))
     )
     for curvature in (2e4, 9e15, np.inf, np.nan):
-        turning = tuple(msgspec.structs.replace(each, curvature_1_m=(curvature, 0.0, 0.0)) for each in coiled.stations)
+        turning = tuple(
+            msgspec.structs.replace(station, curvature_1_m=(curvature, 0.0, 0.0)) for station in coiled.stations
+        )
         with pytest.raises(ValueError, match=r'"coil" turns at rest by .* rad, but 10000 rad are allowed: correct'):
             rest_sections(msgspec.structs.replace(coiled, stations=turning), np.ones(1))
 
@@ -75,7 +77,7 @@ def test_refusals():
     refused("straight beams only", modes=four, level="full", section=stations(1.0, (0.0, 0.0, 1.0)))
     refused('leave it out, or make the level "exact"', modes=s.Modes(count=2, pieces=2), level="full")
     refused("give 2000 at most", modes=s.Modes(count=40, pieces=1000))
-    unsheared = [_without_shear(each) for each in stations()]
+    unsheared = [_without_shear(station) for station in stations()]
     refused("GAy_N", modes=s.Modes(count=1, polynomials=s.StrainPolynomials(shear_y=1, bending_y=2)), section=unsheared)
     points = inertia_points([1.0, 1.0], np.eye(3)[:2], np.ones((2, 3, 1)))
     raw = SceneBuilder("raw").modal_body("raw", points=points, stiffness=[[1.0]], level="exact")

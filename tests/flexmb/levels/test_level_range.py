@@ -99,8 +99,8 @@ def test_signals_are_watched_while_turns_are(make):
     scene = scenes.with_events(make(), "pivot.rotation")
     looked = fm.simulate(scene, 2e-3, "rk4", samples=3, step=2e-4)
     waived = fm.simulate(replace(scene, allow=("level_range",)), 2e-3, "rk4", samples=3, step=2e-4)
-    assert np.array_equal(looked.q, waived.q) and {"is held", "is free"} < {each.name for each in looked.events}
-    assert [(each.name, each.t) for each in looked.events] == [(each.name, each.t) for each in waived.events]
+    assert np.array_equal(looked.q, waived.q) and {"is held", "is free"} < {event.name for event in looked.events}
+    assert [(event.name, event.t) for event in looked.events] == [(event.name, event.t) for event in waived.events]
 
 
 def test_linear_models_and_campbell_diagrams_warn_once():

@@ -76,8 +76,8 @@ def started_bent(scene):
 
 def warned_by(doubts):
     """The doubts as warnings, to compare them with those of other doors."""
-    for each in doubts:
-        warnings.warn(f"{each.what}; {each.remedy}", fm.SceneWarning, stacklevel=1)
+    for doubt in doubts:
+        warnings.warn(f"{doubt.what}; {doubt.remedy}", fm.SceneWarning, stacklevel=1)
 
 
 def told(call, scene):
@@ -93,7 +93,7 @@ def test_every_door_is_known():
     for name in fm.__all__:
         call = getattr(fm, name)
         if inspect.isfunction(call):
-            kinds = " ".join(str(each.annotation) for each in inspect.signature(call).parameters.values())
+            kinds = " ".join(str(parameter.annotation) for parameter in inspect.signature(call).parameters.values())
             if re.search(r"\b(Scene|System|Batch)\b", kinds):
                 found.add(name)
     assert found == set(ANSWERS) | set(OTHERS)

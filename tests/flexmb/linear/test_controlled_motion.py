@@ -87,9 +87,9 @@ def test_a_spring_and_damper_do_the_same(closed):
     else:
         scene, driven = hanging(law), "pivot"
     hinges = tuple(
-        msgspec.structs.replace(each, rotation=msgspec.structs.replace(each.rotation, torque_Nm=None, **spring))
-        if each.name == driven else each
-        for each in scene.hinges
+        msgspec.structs.replace(hinge, rotation=msgspec.structs.replace(hinge.rotation, torque_Nm=None, **spring))
+        if hinge.name == driven else hinge
+        for hinge in scene.hinges
     )  # fmt: skip
     other = fm.compile(msgspec.structs.replace(fm.open_loop(scene), hinges=hinges))
     state = other.initial_state if closed else started(fm.open_loop(scene))
@@ -100,8 +100,10 @@ def test_a_spring_and_damper_do_the_same(closed):
     found, expected = fm.ControlledMotion(own).evaluation_derivatives(here), other.evaluation_derivatives(state)
     for name in ("by_displacement", "by_speed", "by_force", "by_time"):
         pairs = [(found.accelerations, expected.accelerations), (found.momentum, expected.momentum)]
-        pairs += [(found.loads[each], expected.loads[each]) for each in expected.loads if each != driven]
-        pairs += [(found.markers[each].acceleration, expected.markers[each].acceleration) for each in expected.markers]
+        pairs += [(found.loads[load], expected.loads[load]) for load in expected.loads if load != driven]
+        pairs += [
+            (found.markers[marker].acceleration, expected.markers[marker].acceleration) for marker in expected.markers
+        ]
         for one, two in pairs:
             mine, its = getattr(one, name), getattr(two, name)
             known = np.isfinite(its)  # redundant closures leave loads open

@@ -53,7 +53,7 @@ def test_five_turns_by_path():
     """As by one equilibrium, and a path of few steps."""
     values = 2.0 * np.pi * np.array([0.0, 2.5, 4.5, 5.0])
     path = fm.equilibrium_path(strip(20, torque=0.0), "loads.load.function.value", values)
-    assert not path.critical and {each.stability for each in path.states} == {"stable"} and len(path.states) < 30
+    assert not path.critical and {state.stability for state in path.states} == {"stable"} and len(path.states) < 30
     for value in values[1:]:
         circle = np.array([np.sin(value), 1.0 - np.cos(value), 0.0]) / value
         system = fm.compile(strip(20, torque=value))
@@ -90,7 +90,7 @@ def test_elastica_by_any_polynomials_and_by_path():
     assert {each.stability for each in far} == {"stable"}
     assert np.max(np.abs(np.array(places) - elastica(300.0))) < 2e-3
     path = fm.equilibrium_path(strip(12, force=0.0), "loads.load.function.value", [0.0, 10.0, 300.0])
-    assert not path.critical and {each.stability for each in path.states} == {"stable"}
+    assert not path.critical and {state.stability for state in path.states} == {"stable"}
     system = fm.compile(strip(12, force=300.0))
     assert tip(system, path.at(10.0)[0]) == pytest.approx(elastica(10.0), abs=1e-11)
     assert tip(system, path.at(300.0)[0]) == pytest.approx(places[1], abs=1e-9)
@@ -120,10 +120,10 @@ def test_a_truss_snaps_through():
     assert [each.kind for each in path.critical] == ["limit", "limit"]
     assert [each.value for each in path.critical] == pytest.approx([top, -top], rel=1e-8)
     assert [each.state.q[0] for each in path.critical] == pytest.approx([LIMIT, -LIMIT], rel=1e-5)
-    heights = np.array([each.q[0] for each in path.states])
+    heights = np.array([state.q[0] for state in path.states])
     assert path.values == pytest.approx(np.vectorize(load)(heights), abs=1e-8 * top)
     between = np.abs(heights) < LIMIT * (1.0 - 1e-4)
-    stable = np.array([each.stability == "stable" for each in path.states])
+    stable = np.array([state.stability == "stable" for state in path.states])
     assert np.array_equal(stable, ~between | (np.abs(np.abs(heights) - LIMIT) < 1e-4) & stable)
     assert [each.stability for each in path.at(0.5 * top)] == ["stable", "unstable", "stable"]
     assert path.values[-1] == 1.2 * top and heights[-1] < -HIGH
@@ -226,7 +226,7 @@ def test_an_arch_snaps_through():
     """All of its equilibria, and both limit points, against shooting over the height of the crown; values beside them
     name both branches' stability."""
     path = fm.equilibrium_path(arch(), "loads.push.function.value", [0.0, 0.62, 1.5])
-    found, by_hand, limits = np.array([each.q[0] for each in path.states]), Shooting(), []
+    found, by_hand, limits = np.array([state.q[0] for state in path.states]), Shooting(), []
     assert found[0] == pytest.approx(RISE) and found[-1] < -RISE and np.all(np.diff(found) < 0.0)
     critical = [float(each.state.q[0]) for each in path.critical]
     for height, value in zip(found, path.values, strict=True):
@@ -237,7 +237,7 @@ def test_an_arch_snaps_through():
     assert [each.value for each in path.critical] == pytest.approx(limits, abs=1e-7)
     upper, lower = critical
     beside = np.min(np.abs(found[:, None] - critical), axis=1) > 1e-4
-    stable = np.array([each.stability == "stable" for each in path.states])
+    stable = np.array([state.stability == "stable" for state in path.states])
     assert np.array_equal(stable[beside], ((found > upper) | (found < lower))[beside])
     assert [each.stability for each in path.at(0.62)] == ["stable", "unstable", "stable"]
     assert len(path.states) < 60

@@ -87,10 +87,13 @@ def test_a_transport_without_its_coupling_is_noticed() -> None:
     body = uniform(coupled_stiffness(), section_mass())
     for key in ("stiffness", "inertia"):
         stations = []
-        for each, point in zip(body.stations, POINTS, strict=True):
-            moved = restated(each, point)
+        for given, point in zip(body.stations, POINTS, strict=True):
+            moved = restated(given, point)
             whole = np.array(getattr(moved, key))
-            whole[:3, 3:], whole[3:, :3] = np.array(getattr(each, key))[:3, 3:], np.array(getattr(each, key))[3:, :3]
+            whole[:3, 3:], whole[3:, :3] = (
+                np.array(getattr(given, key))[:3, 3:],
+                np.array(getattr(given, key))[3:, :3],
+            )
             stations.append(replace(moved, **{key: matrix(whole)}))
         assert strange(body, replace(body, stations=tuple(stations))) > 1e-3
 
@@ -233,7 +236,7 @@ def test_a_beam_beside_its_axis_is_the_same_beam() -> None:
     modes = Modes(count=6, boundary="free-free")
     body = uniform(coupled_stiffness(), section_mass(), modes=modes)
     y, z = POINTS[0]
-    beside = replace(body, stations=tuple(replace(each, reference_point_m=(-y, -z)) for each in body.stations))
+    beside = replace(body, stations=tuple(replace(station, reference_point_m=(-y, -z)) for station in body.stations))
     np.testing.assert_allclose(omegas(beside), omegas(body), rtol=1e-9)
     one = replace(beside, stations=(*beside.stations[:1], *body.stations[1:]))  # at one end only: another beam
     assert np.max(np.abs(omegas(one) / omegas(body) - 1.0)) > 1e-3
@@ -248,7 +251,7 @@ def test_an_axis_off_the_centroid_bends_as_the_centroid_does() -> None:
     modes = Modes(count=5, boundary="free-free", families=("axial", "bending_y"))
     ends = numbers, replace(numbers, x_m=LENGTH)
     beside = coupled(*ends, theory="euler-bernoulli", modes=modes)
-    on_axis = replace(beside, stations=tuple(replace(each, reference_point_m=(0.0, 0.0)) for each in ends))
+    on_axis = replace(beside, stations=tuple(replace(end, reference_point_m=(0.0, 0.0)) for end in ends))
     np.testing.assert_allclose(omegas(beside), omegas(on_axis), rtol=1e-10)
 
 

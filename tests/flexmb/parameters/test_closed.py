@@ -54,7 +54,7 @@ def test_motion_and_loads_against_recompiled_chains():
     state = system.admissible(system.state(system.initial_state.q, system.initial_state.u))
     p = system.parameters(NAMES)
     rates, loads = p.accelerations(state), p.loads(state)
-    known = np.isfinite(np.concatenate([each for each in system.evaluate(0.0, state.q, state.u).loads.values()]))
+    known = np.isfinite(np.concatenate([load for load in system.evaluate(0.0, state.q, state.u).loads.values()]))
     mine = np.concatenate([rates, *loads.values()])
     known = np.concatenate([np.ones(system.nu, bool), known])
     np.testing.assert_array_equal(np.isfinite(mine), np.tile(known[:, None], len(NAMES)))

@@ -200,7 +200,7 @@ def _case(path: Path) -> str:
 
 @pytest.mark.parametrize(
     "path",
-    [pytest.param(each, id=_case(each), marks=() if _case(each) in QUICK else pytest.mark.slow) for each in SCENES],
+    [pytest.param(scene, id=_case(scene), marks=() if _case(scene) in QUICK else pytest.mark.slow) for scene in SCENES],
 )
 @pytest.mark.filterwarnings("ignore::flexmb.SceneWarning", "ignore::flexmb.PrecisionWarning")
 def test_it_contains_what_finer_output_times_show(path: Path) -> None:

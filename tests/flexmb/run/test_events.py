@@ -32,14 +32,14 @@ def test_a_ball_bounces_as_the_closed_form(method, options):
     run = fm.simulate(ball(height, impact(e)), 2.5, method, samples=101, **options)
     expected = first * (1.0 + 2.0 * np.cumsum([0.0, e, e**2, e**3, e**4]))
     count = int(np.sum(expected < 2.5))
-    assert run.finished and [each.name for each in run.events] == ["bounce"] * count
-    assert np.allclose([each.t for each in run.events], expected[:count], rtol=0.0, atol=1e-11)
+    assert run.finished and [event.name for event in run.events] == ["bounce"] * count
+    assert np.allclose([event.t for event in run.events], expected[:count], rtol=0.0, atol=1e-11)
     speed = G * first * e ** np.arange(count)
-    impulses = [each.impulses["rail.translation"] for each in run.events]
+    impulses = [event.impulses["rail.translation"] for event in run.events]
     assert np.allclose(impulses, 2.0 * (1.0 + e) * speed, rtol=1e-11)
-    assert np.allclose([each.energy_change for each in run.events], -(1.0 - e**2) * speed**2, rtol=1e-11)
+    assert np.allclose([event.energy_change for event in run.events], -(1.0 - e**2) * speed**2, rtol=1e-11)
     assert np.abs(run.energy_drift).max() < 1e-9 and run.q.min() > -1e-12
-    assert all(each.before.q[0] == each.after.q[0] and abs(each.before.q[0]) < 1e-13 for each in run.events)
+    assert all(event.before.q[0] == event.after.q[0] and abs(event.before.q[0]) < 1e-13 for event in run.events)
 
 
 def arm(*events: fm.SceneEvent, flexible: bool = False) -> fm.Scene:
@@ -71,7 +71,7 @@ def deployed() -> fm.Trajectory:
 
 
 def test_latched_hinges_stay_and_momentum_passes_through(deployed):
-    names = [each.name for each in deployed.events]
+    names = [event.name for event in deployed.events]
     assert sorted(names) == ["elbow latches", "release", "root latches"] and names[-1] == "release"
     for event in deployed.events[:2]:
         place = {"root latches": 8, "elbow latches": 9}[event.name]
@@ -82,14 +82,14 @@ def test_latched_hinges_stay_and_momentum_passes_through(deployed):
     scale = np.abs(deployed.momentum).max()
     assert np.abs(deployed.momentum_drift).max() < 1e-10 * scale
     assert np.abs(deployed.energy_drift).max() < 1e-9 * deployed.energy_scale
-    lost = -sum(each.energy_change for each in deployed.events)
+    lost = -sum(event.energy_change for event in deployed.events)
     assert lost > 0.01 * deployed.energy_scale and np.isclose(deployed.work[-1], -lost, rtol=1e-9)
     after = deployed.t >= 2.5
     assert np.ptp(deployed.q[after, 9]) > 0.0 and np.ptp(deployed.q[after, 8]) == 0.0  # the elbow alone was let go
 
 
 def test_the_drive_of_a_latched_hinge_is_the_load_across_it(deployed):
-    event = next(each for each in deployed.events if each.name == "root latches")
+    event = next(event for event in deployed.events if event.name == "root latches")
     held = deployed.t >= event.t
     assert np.all(deployed.drives["root"][~held] == 0.0) and np.all(deployed.drives["root"][held] != 0.0)
 
@@ -123,6 +123,7 @@ def test_a_latched_scene_is_one_with_a_weld():
 
 def test_changes_at_times_are_those_of_a_pulse():
     """A force that is switched on and off by events, and the same force as a pulse."""
+
     def switch(t: float, value: float) -> fm.SceneEvent:
         change = fm.Change(path="rail.translation.force_N", value=fm.Constant(value=value))
         return fm.SceneEvent(name=f"at {t}", watch="time", level=t, actions=(change,))
@@ -131,7 +132,7 @@ def test_changes_at_times_are_those_of_a_pulse():
     pulsed = ball(0.0, force=fm.Pulse(value=30.0, start_s=0.25, duration_s=0.5), stiffness=20.0)
     a, b = (fm.simulate(scene, 1.0, samples=21) for scene in (switched, pulsed))
     assert np.allclose(a.q, b.q, rtol=0.0, atol=1e-9) and np.allclose(a.work, b.work, rtol=0.0, atol=1e-8)
-    assert [each.t for each in a.events] == [0.25, 0.75] and len(a.t) == 21
+    assert [event.t for event in a.events] == [0.25, 0.75] and len(a.t) == 21
 
 
 def test_a_stiffness_that_changes_does_work():
@@ -155,7 +156,7 @@ def test_sensors_are_watched_by_their_names():
     speed = fm.CoordinateSensor(name="speed", of="rail", quantity="rate")
     late = fm.SceneEvent(name="late", watch="clock", level=0.1, actions=(impact(1.0).actions[0],))
     run = fm.simulate(ball(1.0, ended, late, speed, fm.TimeSensor(name="clock")), 2.0, samples=11)
-    assert [each.name for each in run.events] == ["late", "fast"] and run.u[-1, 0] == -2.0
+    assert [event.name for event in run.events] == ["late", "fast"] and run.u[-1, 0] == -2.0
     with pytest.raises(fm.SceneError, match='no "height"'):
         ball(1.0, fm.SceneEvent(name="e", watch="height", level=0.0, actions=(fm.EndRun(),)))
 

@@ -60,7 +60,7 @@ def check(run: fm.Trajectory, kind: str, start: float, instant: float, shown: li
     tau, after = np.maximum(run.t - instant, 0.0), run.t >= instant
     way, speed = KINDS[kind][1](tau)
     place = np.where(after, instant - start + way, run.t - start)
-    assert run.finished and [each.name for each in run.events] == shown
+    assert run.finished and [event.name for event in run.events] == shown
     assert run.q[:, 0] == pytest.approx(place, abs=1e-9)
     assert run.u[after, 0] == pytest.approx(speed[after], abs=1e-9)
 
@@ -137,7 +137,7 @@ def test_events_of_one_instant_happen_in_the_order_of_the_scene() -> None:
         )
         run = fm.simulate(cart(law, speed, *items, rate=1.0), 1.0, samples=5)
         names = ["first", "second", "last"] if later else ["first", "second"]  # at the start nothing was said before
-        assert [each.name for each in run.events] == names and {each.t for each in run.events} == {later}
+        assert [event.name for event in run.events] == names and {event.t for event in run.events} == {later}
         assert run.signals["law"][:, 0].tolist() == [float(t < later) for t in run.t]
 
 
@@ -173,7 +173,7 @@ def test_a_stop_above_and_one_that_nothing_presses() -> None:
     stop = fm.Impact(coordinate=WHERE, restitution=1.0, rests=True)
     up = fm.Constant(value=40.0)
     ceiling = fm.simulate(cart(event(WHERE, 0.0, stop, crossing="rising"), gravity=G, force=up), 1.0, samples=3)
-    assert [each.name for each in ceiling.events] == ["it: at rest"] and np.all(ceiling.q == 0.0)
+    assert [event.name for event in ceiling.events] == ["it: at rest"] and np.all(ceiling.q == 0.0)
     assert ceiling.signals["it: stop"][-1, 0] == pytest.approx(2.0 * G - 40.0, rel=1e-12)
     still = fm.simulate(cart(event(WHERE, 0.0, stop)), 1.0, samples=3)
     assert still.events == () and np.all(still.q == 0.0)
@@ -191,7 +191,7 @@ def test_what_is_let_go_on_a_stop_rests_on_it() -> None:
         free = event("time", instant, fm.Release(coordinate=WHERE), name="free")
         scene = cart(stop, free, gravity=G, prescribed=fm.Constant(value=0.0))
         run = fm.simulate(scene, 1.0, samples=5)
-        assert [each.name for each in run.events] == ["free", "it: at rest"]
+        assert [event.name for event in run.events] == ["free", "it: at rest"]
         assert run.finished and np.abs(run.q).max() == 0.0
         rest = fm.simulate(run.restart.scene, 2.0, state=run.restart, samples=3)
         assert rest.events == () and np.abs(rest.q).max() == 0.0
@@ -226,7 +226,7 @@ def test_a_run_that_is_taken_up_at_an_event_is_one_that_had_never_ended(kind: st
     """To the last bit: at each event, soon before and after it, at an instant of a controller, and twice."""
     watch, options = ("height[2]" if kind == "change" else WHERE), METHODS[method]
     scene, end = hopping(watch, kind), 2.5
-    cuts = {each.t for each in fm.simulate(scene, end, method, samples=3, **options).events}
+    cuts = {event.t for event in fm.simulate(scene, end, method, samples=3, **options).events}
     times = np.unique([0.0, *cuts, *(min(cuts) + np.array([-1e-3, 1e-3])), 7 * 0.15, 2.2, end])
     whole = fm.simulate(scene, end, method, samples=times, **options)
     assert len(whole.events) > 2
@@ -239,8 +239,8 @@ def test_a_run_that_is_taken_up_at_an_event_is_one_that_had_never_ended(kind: st
         assert np.array_equal(second.q[1:], whole.q[left]) and np.array_equal(second.u[1:], whole.u[left])
         assert np.array_equal(second.work[1:], whole.work[left])
         shown = [*first.events, *second.events]
-        assert [each.name for each in shown] == [each.name for each in whole.events]
-        assert [each.t for each in shown] == pytest.approx([each.t for each in whole.events], abs=1e-11)
+        assert [each.name for each in shown] == [event.name for event in whole.events]
+        assert [each.t for each in shown] == pytest.approx([event.t for event in whole.events], abs=1e-11)
         if kind == "sampled":
             assert np.array_equal(second.signals["law"][1:], whole.signals["law"][left])
 
@@ -261,4 +261,4 @@ def test_an_end_a_rounding_behind_an_event_is_reached() -> None:
         for roundings in (1, 3, 20):
             end = 0.5 + roundings * np.spacing(0.5)
             run = fm.simulate(scene, end, method, samples=2, **options)
-            assert run.finished and [each.name for each in run.events] == ["it"]
+            assert run.finished and [event.name for event in run.events] == ["it"]

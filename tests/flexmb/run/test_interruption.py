@@ -54,7 +54,10 @@ for method, options in eval(sys.argv[1]).items():
         run, lasted = stopped.trajectory, time.process_time() - pressed
         print(method, lasted, run.status.name, run.stopped_at, len(run.t), run.t[-1], " ".join(str(stopped).split()))
 """
-METHODS = {name: {"step": 1e-6} if each.fixed else {"rtol": 1e-12, "atol": 1e-14} for name, each in INTEGRATORS.items()}
+METHODS = {
+    name: {"step": 1e-6} if integrator.fixed else {"rtol": 1e-12, "atol": 1e-14}
+    for name, integrator in INTEGRATORS.items()
+}
 
 
 def test_a_compiled_run_ends_within_a_second_and_keeps_what_it_reached():

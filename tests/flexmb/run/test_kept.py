@@ -81,7 +81,7 @@ def test_what_a_closed_chain_remembers_would_be_noticed(monkeypatch):
     assert not equal(fm.simulate(used, 1.0, samples=7), fm.simulate(fresh, 1.0, samples=7))
 
 
-@pytest.mark.parametrize("method", [name for name, each in INTEGRATORS.items() if each.linearises])
+@pytest.mark.parametrize("method", [name for name, integrator in INTEGRATORS.items() if integrator.linearises])
 def test_a_later_run_with_jacobians_is_the_first_one_again(method):
     options = {"step": 5e-3} if INTEGRATORS[method].fixed else {}
     system = fm.compile(pendulum())
@@ -160,4 +160,4 @@ def test_outputs_that_overflow_end_the_samples(monkeypatch):
     run = fm.simulate(pendulum(), 1.0, samples=5)
     assert run.status is Status.NONFINITE and run.stopped_at == 0.5
     assert run.message.startswith("stopped at t = 0.5 s: the result at t = 0.5 s is not finite")
-    assert all(len(each) == 2 for each in numbers(run))
+    assert all(len(number) == 2 for number in numbers(run))

@@ -71,7 +71,7 @@ def centrifuge(rate: float) -> fm.Scene:
     )
 
 
-@pytest.mark.parametrize("method", [name for name, each in INTEGRATORS.items() if not each.fixed])
+@pytest.mark.parametrize("method", [name for name, integrator in INTEGRATORS.items() if not integrator.fixed])
 def test_a_scene_in_which_nothing_moves_is_at_rest_to_the_end(method):
     post = fm.SceneBuilder("post").rigid_body("post", mass=1.0, inertia=(1, 1, 1))
     scene = post.weld("foot", "ground", "post").scene()

@@ -14,7 +14,7 @@ from tests.bounds import observed_order
 from tests.flexmb.run.test_simulate import driven_arm, tumbling_pair
 from tests.trees import FULL, random_scene
 
-STIFF = [name for name, each in INTEGRATORS.items() if each.linearises]
+STIFF = [name for name, integrator in INTEGRATORS.items() if integrator.linearises]
 ADAPTIVE = [name for name in STIFF if not INTEGRATORS[name].fixed]
 # Every element there is, without the high modes of beams: smooth enough to be known to 1e-12 in a second.
 EVERYTHING = replace(FULL, bodies=4, carriers=("rigid", "modal"), wheels=1, point_masses=1, deformation=0.02)

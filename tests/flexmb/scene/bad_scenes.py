@@ -72,8 +72,8 @@ def drop(collection, index):
 
 def both(*mutations):
     def mutate(data):
-        for each in mutations:
-            each(data)
+        for mutation in mutations:
+            mutation(data)
 
     return mutate
 

@@ -70,6 +70,6 @@ def test_coordinates_carry_their_schema_keys():
         s.Planar: ["x", "y", "rotation"], s.Free: [],
     }  # fmt: skip
     for kind, expected in names.items():
-        assert [each.name for each in coordinates(kind(**ends))] == expected
+        assert [coordinate.name for coordinate in coordinates(kind(**ends))] == expected
     mass = s.PointMass(name="bob", body="a", mass_kg=1.0, directions=((1.0, 0.0, 0.0),))
     assert coordinates(mass) == (("coordinates[0]", s.LinearCoordinate()),)

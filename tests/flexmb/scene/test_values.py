@@ -29,7 +29,7 @@ def test_values_land_where_their_paths_lead(scene):
         "pivot.rotation.torque_Nm": {"kind": "pulse", "value": 2.0, "start_s": 0.0, "duration_s": 1.0},
     })  # fmt: skip
     assert other.bodies[0].mass_kg == 3.0 and isinstance(other.bodies[0].mass_kg, float)
-    assert other.bodies[1].level == "linear" and {each.EIy_Nm2 for each in other.bodies[1].stations} == {7.0}
+    assert other.bodies[1].level == "linear" and {station.EIy_Nm2 for station in other.bodies[1].stations} == {7.0}
     assert other.gravity_m_s2 == (0.0, 0.0, -1.62) and other.hinges[0].rotation.angle_rad == 0.1
     assert other.hinges[0].rotation.torque_Nm == fm.Pulse(value=2.0, start_s=0.0, duration_s=1.0)
     assert other.with_values({"pivot.rotation.torque_Nm": None}).hinges[0].rotation.torque_Nm is None

@@ -198,7 +198,7 @@ def compared(scene: Scene, group: list[str], of: list[str], wrong: list[Any]) ->
     found["without runs beside it"] = len(group) - len(others)
     scales = {path: Number(scene, path).scale for path in others}
     kept = run.derivatives[-1][:, [group.index(path) for path in others]]
-    noise = rounding(scene, T_END, {path: 1e-4 * STEP * each for path, each in scales.items()}, of, kept, **TIGHT)
+    noise = rounding(scene, T_END, {path: 1e-4 * STEP * scale for path, scale in scales.items()}, of, kept, **TIGHT)
     for derivative, (path, other) in zip(kept.T, others.items(), strict=True):
         size = max(float(np.max(np.abs(other[0]))), 1e-9 / scales[path])
         doubt = _doubt(other[1], noise, STEP * scales[path])

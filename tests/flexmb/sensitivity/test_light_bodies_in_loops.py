@@ -95,6 +95,6 @@ def test_derivatives_that_round_by_more_than_the_tolerance_are_refused_and_the_r
     with pytest.raises(fm.DynamicsError, match="round by more than the tolerances, atol = 1e-13.*a larger rtol and at"):
         fm.sensitivities(scene, 0.02, by, of, samples=2, rtol=1e-11, atol=1e-13)
     tolerances = [{"rtol": each, "atol": 1e-2 * each} for each in (1e-8, 1e-9)]
-    looser = [fm.sensitivities(scene, 0.02, by, of, samples=2, **each).derivatives for each in tolerances]
+    looser = [fm.sensitivities(scene, 0.02, by, of, samples=2, **tolerance).derivatives for tolerance in tolerances]
     size = np.max(np.abs(looser[1][-1]), axis=0)
     assert np.all(np.abs(looser[0] - looser[1])[-1] < 1e-5 * size)

@@ -48,7 +48,7 @@ def rest_positions(scene):
     for body, hinge in ordered(scene):
         inboard = pose[hinge.parent] + np.array(hinge.parent_position_m)
         if hinge.parent != "ground":
-            parent = next(each for each in scene.bodies if each.name == hinge.parent)
+            parent = next(body for body in scene.bodies if body.name == hinge.parent)
             inboard = inboard + node_frame(parent, hinge.parent_node).position
         pose[body.name] = inboard - hinge.child_position_m - np.array(node_frame(body, hinge.child_node).position)
     bodies = {body.name: body for body in scene.bodies}

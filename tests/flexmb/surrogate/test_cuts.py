@@ -161,7 +161,7 @@ def test_sharp_kinks_of_the_stiffness_are_told(stiffness: float, is_told: bool, 
     builder = stem(fm.Modes(count=4, families=PLANE), section=section)
     scene = builder.force("f", "stem", node="tip", direction=(0, 1, 0), function=fm.Constant(value=5.0)).scene()
     doubts = [str(each) for each in fm.check_scene(scene)]
-    assert bool(doubts) == is_told and all("x = 0.5 m (a kink of the stiffness)" in each for each in doubts)
+    assert bool(doubts) == is_told and all("x = 0.5 m (a kink of the stiffness)" in doubt for doubt in doubts)
     assert stem_of(cut_where_loaded(scene)).modes.cuts == (("cut_1",) if is_told else None)
     quiet = replace(scene, allow=(*scene.allow, "uncut_beam"))
     fine = substructured(quiet, "stem", [0.5], polynomials=8)
@@ -201,7 +201,7 @@ def test_what_cannot_be_cut_is_refused(cuts: tuple[str, ...], words: str) -> Non
 
 def test_refusals() -> None:
     scene = frame(2, cuts=())
-    with pytest.raises(ValueError, match='cannot be cut at x = 1 m: give places inside'):
+    with pytest.raises(ValueError, match="cannot be cut at x = 1 m: give places inside"):
         substructured(scene, "stem", ["port", 1.0])
     with pytest.raises(ValueError, match='has no node "prot"'):
         substructured(scene, "stem", ["prot"])

@@ -39,7 +39,7 @@ def at_rest(scene: fm.Scene) -> np.ndarray:
     """Markers (2,3) at the equilibrium."""
     system = fm.compile(scene)
     found = fm.equilibrium(system)
-    return np.array([each.position for each in system.evaluate(0.0, found.q, found.u).markers.values()])
+    return np.array([marker.position for marker in system.evaluate(0.0, found.q, found.u).markers.values()])
 
 
 @pytest.mark.parametrize(("count", "order"), [(1, 2), (2, 4), (3, 6)])
@@ -54,12 +54,12 @@ def test_pieces_converge_with_twice_the_power_of_their_polynomials(count: int, o
 def test_pieces_of_a_stiffened_beam_have_three_polynomials_unless_told_otherwise() -> None:
     scene = loaded(fm.Modes(count=4, families=SPACE), (0.1, 0.3, 0.2), level="stiffened")
     chain = substructured(scene, None, 3, level="exact")
-    assert [each.name for each in chain.bodies] == ["beam.p00", "beam.p01", "beam.p02"]
-    assert all(each.level == "exact" and set(polynomials(each).values()) == {3} for each in chain.bodies)
+    assert [body.name for body in chain.bodies] == ["beam.p00", "beam.p01", "beam.p02"]
+    assert all(body.level == "exact" and set(polynomials(body).values()) == {3} for body in chain.bodies)
     own = replace(scene, bodies=(replace(scene.bodies[0], level="exact", modes=fm.Modes(count=2, families=SPACE)),))
-    assert all(each.modes.count == 2 for each in substructured(own, None, 2).bodies)
+    assert all(body.modes.count == 2 for body in substructured(own, None, 2).bodies)
     chosen = fm.StrainPolynomials(bending_y=4, torsion=1)
-    assert all(each.modes.polynomials == chosen for each in substructured(own, None, 2, polynomials=chosen).bodies)
+    assert all(body.modes.polynomials == chosen for body in substructured(own, None, 2, polynomials=chosen).bodies)
 
 
 @pytest.mark.parametrize("curvature", [0.0, 0.7], ids=["straight", "arc"])

@@ -176,7 +176,7 @@ def test_rigidify_keeps_nodes_and_needs_no_modes():
 def _curved(turn: float) -> BeamBody:
     """A beam of level exact on an arc that turns by so much (rad) to the left."""
     (boom, *_) = beam_scene().bodies
-    stations = tuple(replace(each, curvature_1_m=(0.0, 0.0, turn / LENGTH)) for each in boom.stations)
+    stations = tuple(replace(station, curvature_1_m=(0.0, 0.0, turn / LENGTH)) for station in boom.stations)
     return replace(boom, level="exact", stations=stations)
 
 

@@ -39,7 +39,7 @@ class World:
     def renamed(self) -> fm.System:
         """Another system with as many coordinates."""
         names = {"elbow": "knee", "ball": "socket"}
-        hinges = tuple(msgspec.structs.replace(each, name=names[each.name]) for each in self.scene.hinges)
+        hinges = tuple(msgspec.structs.replace(hinge, name=names[hinge.name]) for hinge in self.scene.hinges)
         return fm.compile(msgspec.structs.replace(self.scene, hinges=hinges))
 
     @cached_property
@@ -295,7 +295,7 @@ def but_none(kind: Callable[[Any], Iterator[Variant]]) -> Callable[[Any], Iterat
 
 def but_modal(v: np.ndarray) -> Iterator[Variant]:
     """Of speeds whose last is modal, and not looked at."""
-    return (each for each in vectors(v) if not each.name.endswith(f" at {len(v) - 1}"))
+    return (vector for vector in vectors(v) if not vector.name.endswith(f" at {len(v) - 1}"))
 
 
 def but_columns(kind: Callable[[Any], Iterator[Variant]]) -> Callable[[Any], Iterator[Variant]]:
@@ -306,9 +306,9 @@ def but_columns(kind: Callable[[Any], Iterator[Variant]]) -> Callable[[Any], Ite
 def rows(v: np.ndarray) -> Iterator[Variant]:
     """Of a state made by hand: any length, finite or not; it is for the system to refuse them."""
     loose = {"short", "long", "very long", "empty", "huge", "hugely negative", "large", "tiny", "negative"}
-    for each in vectors(v):
-        if each.name not in loose and not each.name.startswith(("nan", "inf", "-inf")):
-            yield each
+    for vector in vectors(v):
+        if vector.name not in loose and not vector.name.startswith(("nan", "inf", "-inf")):
+            yield vector
 
 
 def quaternion_first(v: np.ndarray) -> Iterator[Variant]:
@@ -320,17 +320,17 @@ def quaternion_first(v: np.ndarray) -> Iterator[Variant]:
 
 def wrong_only(v: np.ndarray) -> Iterator[Variant]:
     """Without those that open a closed chain."""
-    return (each for each in vectors(v) if not each.open and each.plain is None or each.plain is v)
+    return (vector for vector in vectors(v) if not vector.open and vector.plain is None or vector.plain is v)
 
 
 def wrong_only_number(x: float) -> Iterator[Variant]:
-    return (each for each in numbers(x) if not each.open and each.plain is None)
+    return (number for number in numbers(x) if not number.open and number.plain is None)
 
 
 def series(v: np.ndarray) -> Iterator[Variant]:
     """Of a row of any length, or one number."""
     loose = {"short", "long", "very long", "empty", "0-d", "scalar"}
-    return (each for each in vectors(v) if each.name not in loose)
+    return (vector for vector in vectors(v) if vector.name not in loose)
 
 
 def not_a_mode(_: Any) -> Iterator[Variant]:

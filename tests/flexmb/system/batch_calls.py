@@ -75,12 +75,12 @@ def coordinates(v: np.ndarray) -> Iterator[Variant]:
 
 def times(_: Any) -> Iterator[Variant]:
     """Of one time for all copies, or one for each."""
-    yield from (each for each in numbers(0.5) if not isinstance(each.value, np.ndarray | list))
+    yield from (number for number in numbers(0.5) if not isinstance(number.value, np.ndarray | list))
     yield from vectors_or_one(np.linspace(0.25, 0.75, COPIES))
 
 
 def vectors_or_one(v: np.ndarray) -> Iterator[Variant]:
-    yield from (each for each in vectors(v) if each.name != "scalar" and each.value is not None)
+    yield from (vector for vector in vectors(v) if vector.name != "scalar" and vector.value is not None)
     yield Variant("the same for each", np.full(len(v), 0.5), 0.5)
 
 
@@ -218,12 +218,12 @@ def of_batches(w: World) -> Calls:
 
 def finite_tables(v: np.ndarray) -> Iterator[Variant]:
     """Without what is for each copy to refuse."""
-    return (each for each in tables(v) if not each.name.startswith(("nan", "inf", "-inf")))
+    return (table for table in tables(v) if not table.name.startswith(("nan", "inf", "-inf")))
 
 
 def closing(v: np.ndarray) -> Iterator[Variant]:
     """Of rows without those that open a closed chain."""
-    return (each for each in tables(v) if each.plain is v or (each.plain is None and not each.open))
+    return (table for table in tables(v) if table.plain is v or (table.plain is None and not table.open))
 
 
 def sound(states: Callable[..., tuple[np.ndarray, np.ndarray]]) -> Callable[..., tuple[np.ndarray, np.ndarray]]:

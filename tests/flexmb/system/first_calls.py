@@ -66,10 +66,10 @@ def main(which: str, *more: str) -> None:
             problems.append(f"{type(problem).__name__}: {problem}")
 
     threads = [threading.Thread(target=work, args=(system,)) for system in systems]
-    for each in threads:
-        each.start()
-    for each in threads:
-        each.join()
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
     expected = asked(fm, fm.compile(rigid_chain(3)))
     for one in found:
         right = [np.array_equal(a, b) for a, b in zip(one, expected, strict=True)]

@@ -23,8 +23,8 @@ def main() -> None:
     failed: list[object] = []
     threading.excepthook = failed.append
     threads = [threading.Thread(target=work) for _ in range(2)]
-    for each in threads:
-        each.start()
+    for thread in threads:
+        thread.start()
     while "flexmb.system.compile" not in sys.modules:  # then it is being imported, for a second from now on
         time.sleep(1e-3)
     child = os.fork()
@@ -33,8 +33,8 @@ def main() -> None:
         work()
         os._exit(0)
     status = os.waitpid(child, 0)[1]
-    for each in threads:
-        each.join()
+    for thread in threads:
+        thread.join()
     print(status, len(failed))
 
 

@@ -101,7 +101,7 @@ def single(x: np.ndarray) -> np.ndarray:
 
 def _wide(Y: np.ndarray) -> Iterator[Variant]:
     """Of a regressor, which may have any number of rows."""
-    yield from (each for each in matrices(Y) if each.name not in ("short", "very long", "3-D", "empty", "huge"))
+    yield from (matrix for matrix in matrices(Y) if matrix.name not in ("short", "very long", "3-D", "empty", "huge"))
     yield Variant("narrow", Y[:, :-1])
     yield Variant("one row", Y[0], Y[0])
 

@@ -132,7 +132,7 @@ def left_behind(asked: dict[str, Call], thorough: bool = True) -> Iterator[str]:
             objects.setdefault(object_of(name), {})[name] = right
     for name, call in asked.items():
         for argument in call.kinds:
-            for variant in (each for each in variants(name, call, argument, thorough) if each.name in HARD):
+            for variant in (variant for variant in variants(name, call, argument, thorough) if variant.name in HARD):
                 with suppress(*DOCUMENTED), np.errstate(all="ignore"):
                     call.function(**call.arguments | {argument: variant.value})
                 for other, right in objects.get(object_of(name), {}).items():

@@ -96,7 +96,7 @@ def asked(scene: str) -> Asked:
     if scene == WHOLE:
         world = World()
         systems = (world.tree, world.state), (world.chain, world.chain.initial_state)
-        return Asked(calls(world), [own_states(*each) for each in systems])
+        return Asked(calls(world), [own_states(*system) for system in systems])
     system = fm.compile(scenes()[scene]())
     states = own_states(system, system.initial_state)
     return Asked(of_any(system, states[0]), [states])

@@ -43,7 +43,7 @@ def questions(system: fm.System, rates: Any) -> dict[str, Any]:
 
 
 def bits(result: Any) -> list[Any]:
-    return [each.tobytes() if isinstance(each, np.ndarray) else each for each in numbers(result)]
+    return [number.tobytes() if isinstance(number, np.ndarray) else number for number in numbers(result)]
 
 
 @pytest.mark.parametrize("case", ["deploying_boom/flexible", "spacecraft/deploy_and_slew"])

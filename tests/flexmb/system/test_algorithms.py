@@ -30,7 +30,7 @@ def closed() -> fm.System:
 
 def test_names_for_type_checkers_are_those_of_the_list():
     assert get_args(Algorithm) == tuple(ALGORITHMS)
-    assert all(name == each.name for name, each in ALGORITHMS.items())
+    assert all(name == algorithm.name for name, algorithm in ALGORITHMS.items())
 
 
 @pytest.mark.parametrize("name", ALGORITHMS)

@@ -79,7 +79,7 @@ class Cornered(World):
 def asked(w: Cornered, call: Call, side: float) -> np.ndarray | None:
     """(n,) all numbers of a result at a state on this side of the corner, None where it is refused for the corner."""
     pairs = (w.state, w.tree_at(side)), (w.chain.initial_state, w.chain_at(side))
-    given = {name: beside(each, pairs) for name, each in call.arguments.items()}
+    given = {name: beside(argument, pairs) for name, argument in call.arguments.items()}
     try:
         return np.concatenate([np.zeros(0), *map(np.ravel, public_calls.arrays_of(call.function(**given)))])
     except fm.NotDifferentiableError as error:

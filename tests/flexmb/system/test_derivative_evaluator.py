@@ -35,7 +35,7 @@ def is_right(evaluator: DerivativeEvaluator, system: fm.System, state: fm.State)
 def test_it_gives_the_derivatives_to_the_bit(asked: Asked) -> None:
     system, [state, *others] = asked
     evaluator = system.derivative_evaluator()
-    assert all(is_right(evaluator, system, each) for each in others)
+    assert all(is_right(evaluator, system, other) for other in others)
     before = evaluator(state.t, state.q, state.u).copy()
     np.testing.assert_array_equal(evaluator(state.t, state.q.tolist(), state.u.tolist()), before)
 

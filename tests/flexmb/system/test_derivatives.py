@@ -135,7 +135,7 @@ def test_orientations_of_markers_are_small_rotations(name: str) -> None:
     system, q, u = at.system, at.state.q, at.state.u
     xi = directions(at)[0][0]
     rotations = lambda h: np.array([  # noqa: E731
-        each.rotation for each in system.evaluate(0.0, q + h * at.of_rates.motion @ xi, u).markers.values()
+        marker.rotation for marker in system.evaluate(0.0, q + h * at.of_rates.motion @ xi, u).markers.values()
     ])  # fmt: skip
     expected, doubt = extrapolated(rotations, 1e-2)
     turn = orientations(at, lambda each: each.by_displacement @ xi)
@@ -221,8 +221,8 @@ def test_observed_quantities_against_the_dense_route(recipe: str, seed: int) -> 
 
     def observed(q: Any, u: Any, rates: Any) -> dict[str, Any]:
         markers = {
-            name: np.concatenate([each.position, each.velocity, each.acceleration])
-            for name, each in dense.markers(0.0, q, u, rates).items()
+            name: np.concatenate([marker.position, marker.velocity, marker.acceleration])
+            for name, marker in dense.markers(0.0, q, u, rates).items()
         }
         loads = dense.hinge_loads(0.0, q, u, rates) | dense.wheel_loads(0.0, q, u, rates)
         return {**markers, **loads, "momentum": dense.momentum(q, u)}
@@ -233,8 +233,10 @@ def test_observed_quantities_against_the_dense_route(recipe: str, seed: int) -> 
         q, u = state.q + (step if kind == "by_displacement" else 0.0), state.u + (step if kind == "by_speed" else 0.0)
         expected = observed(q, u, rates + (step if kind == "by_acceleration" else 0.0))
         markers = {
-            name: np.concatenate([getattr(part, kind) for part in (each.position, each.velocity, each.acceleration)])
-            for name, each in d.markers.items()
+            name: np.concatenate(
+                [getattr(part, kind) for part in (marker.position, marker.velocity, marker.acceleration)]
+            )
+            for name, marker in d.markers.items()
         }
         found = {**markers, **{name: getattr(each, kind) for name, each in {**d.loads, **d.wheel_loads}.items()}}
         found["momentum"] = getattr(d.momentum, kind)
@@ -253,7 +255,7 @@ def test_rates_along_the_motion(name: str) -> None:
     at = asked(name)
     system, state, d = at.system, at.state, at.of_all
     evaluated = system.evaluate(state.t, state.q, state.u)
-    scale = max((np.max(np.abs(each.acceleration)) for each in evaluated.markers.values()), default=1.0)
+    scale = max((np.max(np.abs(marker.acceleration)) for marker in evaluated.markers.values()), default=1.0)
     u, udot = state.u, at.of_rates.accelerations
     for name, motion in evaluated.markers.items():
         found = d.markers[name]

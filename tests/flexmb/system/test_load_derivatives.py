@@ -36,7 +36,7 @@ def test_loads_of_given_accelerations(name: str) -> None:
         ).values()))  # fmt: skip
         expected, doubt = extrapolated(moved, 1e-2)
         found = np.concatenate([
-            each.by_displacement @ xi + each.by_speed @ du + each.by_time * dt for each in d.loads.values()
+            load.by_displacement @ xi + load.by_speed @ du + load.by_time * dt for load in d.loads.values()
         ])  # fmt: skip
         size = np.max(np.abs(moved(0.0)))
         assert np.max(np.abs(found - expected)) <= 30.0 * np.max(doubt) + 1e-10 * size
@@ -50,7 +50,7 @@ def test_loads_of_given_accelerations(name: str) -> None:
 def test_loads_in_other_axes_against_differences(name: str, axes: Any, node: str | None) -> None:
     at = asked(name)
     system, state = at.system, at.state
-    beam = next(each.name for each in system.scene.bodies if isinstance(each, fm.BeamBody))
+    beam = next(body.name for body in system.scene.bodies if isinstance(body, fm.BeamBody))
     about = None if node is None else (beam if node == "tip" else "ground", node)
     d = system.hinge_load_derivatives(state, axes=axes, about=about)
     for xi, du, dt in directions(at)[:2]:
@@ -63,8 +63,8 @@ def test_loads_in_other_axes_against_differences(name: str, axes: Any, node: str
         assert np.max(np.abs(found - expected)) <= allowed
         assert np.max(np.abs(found * (1.0 + 1e-5) - expected)) > allowed, "a planted error"
     plain = system.hinge_load_derivatives(state)
-    for hinge, each in at.of_all.loads.items():
-        for one, other in zip(plain[hinge], each, strict=True):
+    for hinge, load in at.of_all.loads.items():
+        for one, other in zip(plain[hinge], load, strict=True):
             np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-14 * np.max(np.abs(other), initial=1e-300))
 
 

@@ -267,8 +267,8 @@ def test_a_process_that_is_forked_off_while_threads_work_goes_on():
             system.accelerations(state), system.evaluator()(state.t, state.q, state.u), system.energy(state)
 
     threads = [threading.Thread(target=work) for _ in range(3)]
-    for each in threads:
-        each.start()
+    for thread in threads:
+        thread.start()
     context = multiprocessing.get_context("fork")
     try:
         for _ in range(5):
@@ -280,8 +280,8 @@ def test_a_process_that_is_forked_off_while_threads_work_goes_on():
             assert np.array_equal(told.get(), expected)
     finally:
         busy.set()
-        for each in threads:
-            each.join()
+        for thread in threads:
+            thread.join()
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no forks")
@@ -358,8 +358,8 @@ def test_fifteen_processes_that_are_forked_off_while_threads_compile_scenes():
             _compile_and_evaluate()
 
     threads = [threading.Thread(target=work) for _ in range(3)]
-    for each in threads:
-        each.start()
+    for thread in threads:
+        thread.start()
     try:
         for _ in range(15):
             child = multiprocessing.get_context("fork").Process(target=_compile_and_evaluate)
@@ -371,8 +371,8 @@ def test_fifteen_processes_that_are_forked_off_while_threads_compile_scenes():
             assert not hangs and child.exitcode == 0
     finally:
         busy.set()
-        for each in threads:
-            each.join()
+        for thread in threads:
+            thread.join()
 
 
 def _compile_in_a_child() -> None:
