@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.library.case_error import CaseError
-from crosscheck.validation.measured_set import MODEL, MeasuredSet, Point, Predict, Series, Standing
+from crosscheck.validation.measured_set import MODEL, MeasuredSet, Predict, Reading, Series, Standing
 from flexmb.typing import Real
 
 COVERAGE = 2.0  # two standard deviations: 95 of 100 where errors are normal
@@ -160,7 +160,7 @@ def _draw(drawn: np.random.Generator, value: float, deviation: float, kind: str)
 
 
 def _predicted(
-    of: MeasuredSet, predict: Predict, points: Sequence[Point], inputs: Mapping[str, float], effort: int
+    of: MeasuredSet, predict: Predict, points: Sequence[Reading], inputs: Mapping[str, float], effort: int
 ) -> Real:
     where = f"{of.folder / MODEL}: predict at effort {effort}"
     try:

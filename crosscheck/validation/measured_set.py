@@ -4,15 +4,15 @@ A folder holds `measured.toml` (source, inputs and series), `points.csv` (the re
 
     predict(points, inputs, effort) -> one number for each point, in the unit of its series
 
-`points` is a tuple of `Point`, `inputs` a dict of the values of all inputs by name, and `effort` 0 or 1: the numerical
-error at 1 is to be several times smaller, by more modes or polynomials or by a tighter integration.
+`points` is a tuple of `Reading`, `inputs` a dict of the values of all inputs by name, and `effort` 0 or 1: the
+numerical error at 1 is to be several times smaller, by more modes or polynomials or by a tighter integration.
 """
 
 from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite, sqrt
 from pathlib import Path
@@ -95,7 +95,7 @@ class MeasuredFile(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
 
 
 @dataclass(frozen=True)
-class Point:
+class Reading:
     """A reading: its series, the conditions at which it was taken, and its value in the unit of the series."""
 
     series: str
@@ -103,7 +103,7 @@ class Point:
     measured: float
 
 
-Predict = Callable[[Sequence[Point], Mapping[str, float], int], Sequence[float]]
+Predict = Callable[[Sequence[Reading], Mapping[str, float], int], Sequence[float]]
 T = TypeVar("T")
 
 
@@ -114,13 +114,13 @@ class MeasuredSet:
     name: str
     folder: Path
     content: MeasuredFile
-    points: tuple[Point, ...]
+    points: tuple[Reading, ...]
 
     def series(self, name: str) -> Series:
         """The series of that name."""
         return next(series for series in self.content.series if series.name == name)
 
-    def deviation(self, point: Point) -> float:
+    def deviation(self, point: Reading) -> float:
         """Standard deviation of a reading, in the unit of its series."""
         series = self.series(point.series)
         return series.reading + series.relative * abs(point.measured)
@@ -211,13 +211,21 @@ def _refuse(file: Path, where: str, item: Any, sizes: Mapping[str, float], finit
             raise CaseError(f"{file}: {where}: {key} is {getattr(item, key):g}: give a finite number")
 
 
-def _points(file: Path, content: MeasuredFile) -> tuple[Point, ...]:
-    rows = csv.reader(io.StringIO(_text(file)))
+def _rows(file: Path) -> Iterator[list[str]]:
+    """Line by line; CaseError where the csv module gives up, as it does at a cell of more than 131 072 letters."""
+    try:
+        yield from csv.reader(io.StringIO(_text(file)))
+    except csv.Error as error:
+        raise CaseError(f"{file}: {error}: correct it, or write the file anew") from None
+
+
+def _points(file: Path, content: MeasuredFile) -> tuple[Reading, ...]:
+    rows = _rows(file)
     head = next(rows, [])
     if len(set(head)) < len(head) or not {SERIES, MEASURED} <= set(head):
         raise CaseError(f"{file}: line 1: the columns {SERIES} and {MEASURED} are needed, each column once")
     known = [series.name for series in content.series]
-    points = list[Point]()
+    points = list[Reading]()
     for line, row in enumerate(rows, 2):
         if len(row) != len(head):
             raise CaseError(f"{file}: line {line} has {len(row)} columns, and line 1 has {len(head)}")
@@ -232,7 +240,7 @@ def _points(file: Path, content: MeasuredFile) -> tuple[Point, ...]:
         if MEASURED not in numbers:
             raise CaseError(f"{file}: line {line}: there is no reading: leave the line out")
         measured = numbers.pop(MEASURED)
-        points.append(Point(cells[SERIES], MappingProxyType(numbers), measured))
+        points.append(Reading(cells[SERIES], MappingProxyType(numbers), measured))
     for name in known:
         if not any(point.series == name for point in points):
             raise CaseError(f'{file}: series "{name}" has no point: leave it out of {FILE}')

@@ -72,7 +72,7 @@ def closed_by(scene: Scene, **changes) -> Scene:
 
 
 REFUSED = [
-    ("mujoco", closed_by(scene_of("four_bar"), type="weld"), "of type weld"),
+    ("mujoco", closed_by(scene_of("four_bar"), type="universal"), "of type universal"),
     ("exudyn", closed_by(scene_of("four_bar"), body_b="ground", node_b="origin"), "exchange a and b"),
     ("native", rigidify(scene_of("flexible_four_bar")), "the mechanism is locked"),
     ("native-frisch", scene_of("four_bar"), "closures"),

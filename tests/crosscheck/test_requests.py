@@ -50,6 +50,7 @@ UNKNOWN: dict[tuple[str, ...], tuple[str, str]] = {
     ("mutate", "CASE", "-e"): ("natve", NATIVE),
     ("invariance", "CASE", "-e"): ("natve", NATIVE),
     ("stability", "MAP"): ("vibrating_hinje", 'did you mean "vibrating_hinge"?'),
+    ("validate", "SET"): ("yoyo_dispin", 'did you mean "yoyo_despin"?'),
 }
 """For every way to name an engine, a case, a variant or a map: a word that is none, and what is suggested."""
 WITHOUT_NAMES = {"report", "compare", "list", "engines", "sweep"}

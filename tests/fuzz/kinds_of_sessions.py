@@ -1,8 +1,10 @@
 """What sessions and runs leave behind and take up: sealed results, sweeps, references, restarts."""
 
+import csv
 import hashlib
 import io
 import json
+import re
 from pathlib import Path
 
 import msgspec
@@ -17,6 +19,8 @@ from crosscheck.sealed.compare import compare_results
 from crosscheck.sealed.seal import ResultsError, read_results, sealed_text
 from crosscheck.terminal.text import Verbosity
 from crosscheck.terminal.verdicts import print_differences
+from crosscheck.validation.measured_set import read_set
+from flexmb.scene.reading import Unreadable, read_text
 from tests.crosscheck.sealed.test_compare import made
 from tests.crosscheck.sessions import CASE, PROVIDER
 from tests.fuzz import mutate
@@ -61,6 +65,8 @@ def of_sessions(folder: Path) -> dict[str, Kind]:
     values, knowledge = _reference()
     for name, content in (("reference.csv", values), ("reference.toml", knowledge)):
         (folder / name).write_bytes(content)
+    sets = [file.read_bytes() for file in sorted(SHIPPED.glob("measured/*/measured.toml"))]
+    points = [file.with_name("points.csv").read_bytes() for file in sorted(SHIPPED.glob("measured/*/measured.toml"))]
     sealed = (*mutate.BYTES, mutate.string, mutate.number, *[mutate.seal_anew] * 6)
     table = (*mutate.TEXT, mutate.lines, *[mutate.cells] * 4)
     archive = (*mutate.BYTES[:3], *[mutate.members] * 6)
@@ -69,6 +75,8 @@ def of_sessions(folder: Path) -> dict[str, Kind]:
         "sweep": Kind("sweep.toml", _sweeps(), mutate.TOML, (CaseError,), _sweep),
         "reference": Kind("reference.csv", (values,), table, (CaseError,), _values),
         "knowledge": Kind("reference.toml", (knowledge,), mutate.TOML, (CaseError,), _knowledge, "reference.csv"),
+        "measured set": Kind("measured.toml", tuple(sets), mutate.TOML, (CaseError,), _measured),
+        "measured points": Kind("points.csv", tuple(points), table, (CaseError,), _points),
         "restart": Kind("restart.npz", _restarts(folder), archive, (ValueError,), _restart),
     }
 
@@ -132,6 +140,47 @@ def _sweep(path: Path) -> str | None:
     count = grid if sweep.sampling == "grid" else sweep.number
     found = len(done.records)
     return None if found == count * len(sweep.engines) else f"{found} samples, and {count} were asked for"
+
+
+def _text(path: Path) -> str:
+    """What a regular file says; "" for what cannot be read."""
+    try:
+        return read_text(path)
+    except (OSError, Unreadable):
+        return ""
+
+
+def _measured(path: Path) -> str | None:
+    """The mutant beside readings of every series that it names; no number of it may be other than its checks say."""
+    beside = path.with_name("points.csv")
+    names = re.findall(r'\[\[series\]\]\s*\nname = "([^"\n]*)"', _text(path))
+    rows = io.StringIO(newline="")
+    csv.writer(rows).writerows([("series", "measured"), *((name, 1.0) for name in names)])
+    beside.write_text(rows.getvalue(), encoding="utf-8", newline="")
+    try:
+        known = read_set(path.parent)
+    finally:
+        beside.unlink()
+    numbers = [x for given in known.content.inputs for x in (given.value, given.deviation)]
+    numbers += [known.deviation(point) for point in known.points]
+    return None if np.all(np.isfinite(numbers)) else "a number that is not finite was accepted"
+
+
+def _points(path: Path) -> str | None:
+    """The mutant beside the file of the set whose series it names first."""
+    text = _text(path)
+    files = sorted(SHIPPED.glob("measured/*/measured.toml"))
+    known = {file: re.findall(r'\[\[series\]\]\nname = "([^"]*)"', file.read_text(encoding="utf-8")) for file in files}
+    most = max(files, key=lambda file: sum(text.count(f"\n{name},") + text.count(f'"{name}",') for name in known[file]))
+    beside = path.with_name("measured.toml")
+    beside.write_bytes(most.read_bytes())
+    try:
+        read = read_set(path.parent)
+    finally:
+        beside.unlink()
+    lines = sum(bool(line.strip()) for line in text.splitlines()) - 1
+    finite = all(np.isfinite([point.measured, *point.conditions.values()]).all() for point in read.points)
+    return None if finite and len(read.points) <= lines else "a reading was made up, or is not finite"
 
 
 def _values(path: Path) -> str | None:

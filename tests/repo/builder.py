@@ -91,7 +91,7 @@ def text() -> str:
 def _function(name: str, kind: type[msgspec.Struct]) -> str:
     found = [*_arguments(kind)]
     signature = _filled(f"def {name}(", ["*", *(each.declared for each in found)], f") -> s.{kind.__name__}:")
-    made = [f"    found: s.{kind.__name__} = make(s.{kind.__name__}, **locals())", "    return found"]
+    made = [f"    coordinate: s.{kind.__name__} = make(s.{kind.__name__}, **locals())", "    return coordinate"]
     return "\n".join(["@known_keywords", *signature, *_docstring(kind, found), *made])
 
 

@@ -106,7 +106,7 @@ def test_others_refuse_them_by_name(name):
     assert support.kind == {"pinocchio": "exact", "opensim": "exact", "mujoco": "surrogate"}.get(name, "no")
     alone = engine(name).supports(machine(False))
     assert alone.kind == support.kind
-    assert alone.kind != "no" or "three" in alone.reason or "with a beam" in alone.reason
+    assert alone.kind != "no" or any(word in alone.reason for word in ("three", "with a beam", "with one beam"))
 
 
 def test_frischs_equations_refuse_them():

@@ -41,7 +41,7 @@ def test_built_in_engines_are_found_under_their_names():
 
 
 def test_unknown_name_lists_the_known_ones():
-    with pytest.raises(registry.NoSuchEngine, match="native-generalised-alpha, native-radau5, pinocchio"):
+    with pytest.raises(registry.NoSuchEngine, match="native-generalised-alpha, native-radau5, opensim, pinocchio"):
         registry.engine("abaqus")
 
 

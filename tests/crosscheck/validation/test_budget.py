@@ -154,8 +154,9 @@ def test_one_point_in_twenty_may_be_outside(tmp_path: Path) -> None:
         ({"points_csv": "series,x,measured\nline,1,\n"}, "there is no reading"),
         ({"points_csv": "series,x,measured\n"}, "has no point"),
         ({"points_csv": ""}, "columns series and measured"),
+        ({"points_csv": "series,x,measured\nline,1," + 140_000 * "1"}, "field larger than field limit"),
         ({"measured_toml": HEAD + INPUTS}, "series"),
-        ({"measured_toml": HEAD.replace('title = "A line"', "titel = 1") + SERIES}, "titel"),
+        ({"measured_toml": HEAD.replace("title", "titel")}, "titel"),
         ({"measured_toml": HEAD + INPUTS + INPUTS + SERIES.format(expect="validated", within=1)}, "there twice"),
         (
             {"measured_toml": HEAD + INPUTS.replace("0.1", "-0.1") + SERIES.format(expect="validated", within=1)},

@@ -91,8 +91,21 @@ def test_its_angular_momentum_is_of_order_2() -> None:
     assert errors[0] < 1e-4  # 0.026 in axes that turn with the body
 
 
+def errors(scene: str, method: fm.Method) -> np.ndarray:
+    """(n,3) of runs alike but for tolerances: angles of linear and angular momentum, and the change of energy."""
+    fixed = INTEGRATORS[method].fixed
+    settings = [{"step": STEP}] if fixed else [{"rtol": 1e-6 * f, "atol": 1e-8 * f} for f in (0.7, 0.85, 1.0, 1.2, 1.4)]
+    rows = []
+    for given in settings:
+        done = run(SCENES[scene](), method, **given)
+        energy = np.abs(done.energy_drift).max() / done.energy_scale
+        rows.append((turned(done.momentum[:, 3:]), turned(done.momentum[:, :3]), energy))
+    return np.array(rows)
+
+
 def test_the_page_compares_all_methods() -> None:
-    """Each figure of the table within a factor of 3, which another processor's rounding cannot make of errors."""
+    """Each figure is the median of such runs within a factor of 3, or within their own scatter where that is larger: on
+    the satellite the steps of DOP853 decide on two digits, and another processor's rounding chooses other steps."""
     text = (ROOT / "docs" / "integrators.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| (body|body, beside|satellite) \| `(\w+)` \| ([^|]+) \| ([^|]+) \| ([^|]+) \|$", text, re.M)
     assert {(scene, method) for scene, method, *_ in rows} == {(a, b) for a in SCENES for b in INTEGRATORS}
@@ -100,10 +113,8 @@ def test_the_page_compares_all_methods() -> None:
         if said[0] == "-":  # explicit steps of this size are unstable there
             assert (scene, method) == ("satellite", "rk4")
             continue
-        settings = {"step": STEP} if INTEGRATORS[method].fixed else {"rtol": 1e-6, "atol": 1e-8}
-        found = run(SCENES[scene](), method, **settings)
-        momentum, energy = found.momentum, np.abs(found.energy_drift).max() / found.energy_scale
-        values = turned(momentum[:, 3:]), turned(momentum[:, :3]), energy
-        for figure, value in zip(map(float, said), values, strict=True):
-            assert value < 3.0 * figure, (scene, method)
-            assert value > figure / 3.0 or figure < 1e-11, (scene, method)
+        known = errors(scene, method)
+        scatter = np.maximum(3.0, np.max(known, axis=0) / np.min(known, axis=0))
+        for figure, value, factor in zip(map(float, said), np.median(known, axis=0), scatter, strict=True):
+            assert value < factor * figure, (scene, method)
+            assert value > figure / factor or figure < 1e-11, (scene, method)
