@@ -76,19 +76,19 @@ class Budget:
         mine = np.array([point.series == series.name for point in self.of.points])
         error, within = self.error[mine], self.within[mine]
         size = series.size or float(np.max(np.abs(self.measured[mine])))
-        largest = float(np.max(np.abs(error))) / size
+        largest, u_val = float(np.max(np.abs(error))) / size, float(np.sqrt(np.mean(self.u_val[mine] ** 2))) / size
         standing: Standing = "validated" if np.mean(within) >= SHARE else "model error"
         return SeriesVerdict(
             series, standing, int(np.sum(within)), len(within), float(np.sqrt(np.mean(error**2))) / size, largest,
-            float(np.sqrt(np.mean(self.u_val[mine] ** 2))) / size, self._fault(series, standing, largest, size),
+            u_val, self._fault(series, standing, largest, u_val, size),
         )  # fmt: skip
 
-    def _fault(self, series: Series, standing: Standing, largest: float, size: float) -> str:
+    def _fault(self, series: Series, standing: Standing, largest: float, u_val: float, size: float) -> str:
         """What is not as the file says; "" if nothing."""
         if not np.isfinite(largest):
-            return "it has no prediction"
-        if size == 0.0:
-            return "all readings are 0: give size"
+            return "its error is no finite number"
+        if not COVERAGE * u_val < 1.0:  # an infinite one, too
+            return f"its uncertainty is {u_val:.2g} of its size: nothing could be outside; give narrower inputs"
         if standing != series.expect:
             return f'"{series.expect}" was expected'
         if largest > series.within:

@@ -241,9 +241,12 @@ def _points(file: Path, content: MeasuredFile) -> tuple[Reading, ...]:
             raise CaseError(f"{file}: line {line}: there is no reading: leave the line out")
         measured = numbers.pop(MEASURED)
         points.append(Reading(cells[SERIES], MappingProxyType(numbers), measured))
-    for name in known:
-        if not any(point.series == name for point in points):
-            raise CaseError(f'{file}: series "{name}" has no point: leave it out of {FILE}')
+    for series in content.series:
+        readings = [point.measured for point in points if point.series == series.name]
+        if not readings:
+            raise CaseError(f'{file}: series "{series.name}" has no point: leave it out of {FILE}')
+        if series.size is None and not any(readings):
+            raise CaseError(f'{file}: all readings of series "{series.name}" are 0: give its size in {FILE}')
     return tuple(points)
 
 

@@ -130,6 +130,15 @@ def test_a_claim_is_held(tmp_path: Path, change: dict[str, Any], word: str) -> N
     assert word in verdict.fault and verdict.ok == (not word)
 
 
+@pytest.mark.parametrize("width", ["1e200", "1e3"])
+def test_an_uncertainty_that_nothing_can_miss_is_no_validation(tmp_path: Path, width: str) -> None:
+    """Inputs so wide that every reading is within, as far as infinity."""
+    wide = (HEAD + INPUTS + SERIES.format(expect="validated", within=0.015)).replace("width = 0.1", f"width = {width}")
+    with np.errstate(over="ignore"):
+        (verdict,) = budget(read_set(made(tmp_path, measured_toml=wide))).verdicts()
+    assert verdict.within == verdict.points and "nothing could be outside" in verdict.fault
+
+
 def test_one_point_in_twenty_may_be_outside(tmp_path: Path) -> None:
     """19 of 20 within are validated, 18 are not."""
     for outside, standing in ((1, "validated"), (2, "model error")):
@@ -153,6 +162,13 @@ def test_one_point_in_twenty_may_be_outside(tmp_path: Path) -> None:
         ({"points_csv": "series,x,measured\nline,inf,2\n"}, 'x is "inf"'),
         ({"points_csv": "series,x,measured\nline,1,\n"}, "there is no reading"),
         ({"points_csv": "series,x,measured\n"}, "has no point"),
+        (
+            {
+                "measured_toml": HEAD + SERIES.format(expect="validated", within=1).replace("size = 10.0\n", ""),
+                "points_csv": "series,x,measured\nline,1,0\n",
+            },
+            "are 0: give its size",
+        ),
         ({"points_csv": ""}, "columns series and measured"),
         ({"points_csv": "series,x,measured\nline,1," + 140_000 * "1"}, "field larger than field limit"),
         ({"measured_toml": HEAD + INPUTS}, "series"),
