@@ -25,6 +25,7 @@ from crosscheck.export.pages import case_page, collection_page
 from crosscheck.export.schemas import schema_files
 from crosscheck.library.case_error import CaseError
 from crosscheck.library.find import Case, shipped_folder
+from crosscheck.library.read_file import text_of
 from crosscheck.library.reference import VALUES, StoredReference, current_reference, values_text
 from crosscheck.running.plan import variant_scene
 from flexmb.output.csv_cells import as_text
@@ -32,7 +33,6 @@ from flexmb.output.whole import write_whole
 from flexmb.output.writing import check_folder, folder
 from flexmb.run.channels import unit
 from flexmb.scene.problems import SceneError
-from flexmb.scene.reading import Unreadable, read_text
 
 SUMS = "SHA256SUMS"
 PROGRAM = "rebuild"
@@ -54,7 +54,7 @@ def archive(cases: Sequence[Case]) -> dict[str, str]:
     texts |= {f"schemas/{name}": text for name, text in schema_files().items()}
     texts |= {
         "README.md": collection_page(rows),
-        "LICENSE": _read(shipped_folder() / "LICENSE"),
+        "LICENSE": text_of(shipped_folder() / "LICENSE"),
         "CITATION.cff": citation_cff(),
         "datacite.json": datacite(cases),
         ".zenodo.json": zenodo(cases),
@@ -124,13 +124,6 @@ def check_empty(out: Path) -> None:
     check_folder(out)
     if out.is_dir() and any(out.iterdir()):
         raise OSError(errno.ENOTEMPTY, f"{os.strerror(errno.ENOTEMPTY)}: name a new one, or empty it", str(out))
-
-
-def _read(file: Path) -> str:
-    try:
-        return read_text(file)
-    except Unreadable as error:
-        raise CaseError(f"{file}: {error}") from None
 
 
 def _json(content: object) -> str:

@@ -37,9 +37,7 @@ from typing import Literal
 import msgspec
 
 from crosscheck.library.case_error import CaseError
-from flexmb.scene.convert import to_struct
-from flexmb.scene.problems import SceneError
-from flexmb.scene.reading import Unreadable, parse_toml, read_text
+from crosscheck.library.read_file import struct_of
 
 NAME = "crosscheck-expect.toml"
 EVERY_CASE, EVERY_CHANNEL = "all", "*"
@@ -87,14 +85,7 @@ class ExpectFile(_Entry, frozen=True, kw_only=True):
 
 def read_expect_file(file: Path) -> ExpectFile:
     """The content of a file; CaseError names the file, the place in it and the remedy."""
-    try:
-        return to_struct(parse_toml(read_text(file)), ExpectFile, str(file))
-    except SceneError as error:  # its message would call the file a scene
-        raise CaseError(f"{file}: {'; '.join(map(str, error.problems))}") from None
-    except OSError as error:
-        raise CaseError(f"{file}: {error.strerror}") from None
-    except (Unreadable, RecursionError, OverflowError) as error:
-        raise CaseError(f"{file}: {error}") from None
+    return struct_of(file, ExpectFile)
 
 
 def goal_option(text: str) -> ExpectFile:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TypeVar
 
 from crosscheck.library.accepted import FILE as ACCEPTED
 from crosscheck.library.accepted import Accepted
@@ -14,13 +13,10 @@ from crosscheck.library.case_words import chosen, meant
 from crosscheck.library.check import check_accepted, check_provenance, check_run_file
 from crosscheck.library.claims import Claims
 from crosscheck.library.own_files import source_folder
-from flexmb.scene.convert import to_struct
+from crosscheck.library.read_file import struct_of, text_of
 from flexmb.scene.files import load_scene
-from flexmb.scene.problems import SceneError
-from flexmb.scene.reading import Unreadable, parse_toml, read_text
+from flexmb.scene.reading import parse_toml
 from flexmb.scene.schema import Scene
-
-T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -67,7 +63,7 @@ def shipped_names() -> tuple[str, ...]:
 
 def shipped_tags() -> dict[str, tuple[str, ...]]:
     """The tags of the shipped cases by name; nothing else of them is checked, and a wrong word is refused at once."""
-    run_files = {name: parse_toml(_text(shipped_folder() / name / "run.toml")) for name in shipped_names()}
+    run_files = {name: parse_toml(text_of(shipped_folder() / name / "run.toml")) for name in shipped_names()}
     return {name: tuple(run_file.get("tags", ())) for name, run_file in run_files.items()}
 
 
@@ -101,7 +97,7 @@ def _resolve_one(word: str) -> tuple[Case, ...]:
 def load_case(folder: Path) -> Case:
     """Read and check a case folder; CaseError names file, place and remedy."""
     folder = folder.resolve()
-    run = _read(folder / "run.toml", RunFile)
+    run = struct_of(folder / "run.toml", RunFile)
     try:
         check_run_file(run)
     except CaseError as error:
@@ -112,7 +108,7 @@ def load_case(folder: Path) -> Case:
             raise CaseError(f"{folder / 'run.toml'}: {missing}")
     accepted: Accepted = {}
     if _present(folder / ACCEPTED):
-        accepted = _read(folder / ACCEPTED, Accepted)
+        accepted = struct_of(folder / ACCEPTED, Accepted)
         try:
             check_accepted(accepted, run)
         except CaseError as error:
@@ -120,7 +116,7 @@ def load_case(folder: Path) -> Case:
     provenance_file, readme = folder / "provenance.toml", folder / "README.md"
     provenance: Provenance | None = None
     if _present(provenance_file):
-        provenance = _read(provenance_file, Provenance)
+        provenance = struct_of(provenance_file, Provenance)
         try:
             check_provenance(provenance)
         except CaseError as error:
@@ -130,7 +126,7 @@ def load_case(folder: Path) -> Case:
         folder=folder,
         run=run,
         provenance=provenance,
-        readme=_text(readme) if _present(readme) else "",
+        readme=text_of(readme) if _present(readme) else "",
         accepted=accepted,
     )
 
@@ -138,21 +134,3 @@ def load_case(folder: Path) -> Case:
 def _present(file: Path) -> bool:
     """Whether the file exists, even if it cannot be read, so that reading reports the error."""
     return os.path.lexists(file)
-
-
-def _read(file: Path, kind: type[T]) -> T:
-    try:
-        return to_struct(parse_toml(_text(file)), kind, str(file))
-    except SceneError as error:  # its message would call the file a scene
-        raise CaseError(f"{file}: {'; '.join(map(str, error.problems))}") from None
-    except (Unreadable, RecursionError, OverflowError) as error:
-        raise CaseError(f"{file}: {error}") from None
-
-
-def _text(file: Path) -> str:
-    try:
-        return read_text(file)
-    except Unreadable as error:
-        raise CaseError(f"{file}: {error}") from None
-    except OSError as error:
-        raise CaseError(f"{file}: {error.strerror}") from None

@@ -22,14 +22,15 @@ import numpy as np
 
 from crosscheck.library.case import CaseError, Variant
 from crosscheck.library.find import Case
+from crosscheck.library.read_file import struct_of, text_of
 from flexmb.run.channels import unit
-from flexmb.scene.convert import to_struct
 from flexmb.scene.problems import SceneError
-from flexmb.scene.reading import MIB, Unreadable, parse_toml, read_text
+from flexmb.scene.reading import MIB, Unreadable, parse_toml
 from flexmb.typing import Real
 
 VALUES, KNOWLEDGE = "reference.csv", "reference.toml"
 LIMIT = 64 * MIB
+MADE_BY = "`crosscheck regenerate` makes it"
 AGAIN = "run `crosscheck regenerate`"
 ANEW = f"put back what it was, or delete both files and {AGAIN}"
 TIME = "t [s]"
@@ -69,7 +70,7 @@ class StoredReference:
 
 def load_reference(folder: Path) -> StoredReference:
     """The reference of the case in `folder`; CaseError if there is none, or its files are inconsistent."""
-    values, knowledge = _text(folder / VALUES), _knowledge(folder / KNOWLEDGE)
+    values, knowledge = text_of(folder / VALUES, LIMIT, MADE_BY), _knowledge(folder / KNOWLEDGE)
     if digest(values) != knowledge.values:
         raise CaseError(f"{folder / VALUES} was changed after {KNOWLEDGE} was written: {ANEW}")
     times, channels = parse_values(values, str(folder / VALUES))
@@ -93,7 +94,7 @@ def scene_digest(case: Case, variant: Variant) -> str:
     The scene is taken before the transformation, whose results depend in their last digits on the machine.
     """
     try:
-        scene = json.dumps(parse_toml(_text(case.folder / variant.scene)), sort_keys=True, default=str)
+        scene = json.dumps(parse_toml(text_of(case.folder / variant.scene)), sort_keys=True, default=str)
         model = msgspec.structs.replace(
             variant,
             engines=(),
@@ -204,24 +205,10 @@ def _channel_of(column: str) -> str:
 
 
 def _knowledge(file: Path) -> Knowledge:
-    try:
-        knowledge = to_struct(parse_toml(_text(file)), Knowledge, str(file))
-    except SceneError as error:
-        raise CaseError(f"{file}: {'; '.join(map(str, error.problems))}") from None
-    except Unreadable as error:
-        raise CaseError(f"{file}: {error}") from None
+    knowledge = struct_of(file, Knowledge, MADE_BY)
     for channel, known in knowledge.channels.items():
         if not (0.0 < known.uncertainty < np.inf and 0.0 <= known.scale < np.inf):
             raise CaseError(f"{file}: the uncertainty and scale of {channel} are no numbers that can be judged by")
     if not 0.0 < knowledge.horizon_s < np.inf:
         raise CaseError(f"{file}: a horizon of {knowledge.horizon_s:g} s is none")
     return knowledge
-
-
-def _text(file: Path) -> str:
-    try:
-        return read_text(file, LIMIT)
-    except Unreadable as error:
-        raise CaseError(f"{file}: {error}") from None
-    except OSError as error:
-        raise CaseError(f"{file}: {error.strerror}: `crosscheck regenerate` makes it") from None

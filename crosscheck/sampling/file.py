@@ -47,9 +47,8 @@ from scipy.special import ndtri
 from crosscheck.library.case import CaseError
 from crosscheck.library.channels import part_of
 from crosscheck.library.check.ranges import check_duration, check_samples
-from flexmb.scene.convert import to_struct
-from flexmb.scene.problems import Defect, Place, SceneError
-from flexmb.scene.reading import Unreadable, parse_toml, read_text
+from crosscheck.library.read_file import struct_of
+from flexmb.scene.problems import Defect, Place
 from flexmb.typing import Real
 
 Reduction = Literal["final", "initial", "minimum", "maximum", "range", "mean", "largest"]
@@ -182,13 +181,8 @@ class SweepFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
 
 
 def load_sweep(file: Path) -> SweepFile:
-    """Read and check the file of a sweep; CaseError names file, place and remedy; OSError if it cannot be read."""
-    try:
-        sweep = to_struct(parse_toml(read_text(file)), SweepFile, str(file))
-    except SceneError as error:  # its message would call the file a scene
-        raise CaseError(f"{file}: {'; '.join(map(str, error.problems))}") from None
-    except (Unreadable, RecursionError, OverflowError) as error:
-        raise CaseError(f"{file}: {error}") from None
+    """Read and check the file of a sweep; CaseError names file, place and remedy."""
+    sweep = struct_of(file, SweepFile)
     problems = list(_problems(sweep))
     if problems:
         raise CaseError(f"{file}: {'; '.join(map(str, problems))}")

@@ -24,9 +24,8 @@ import msgspec
 from crosscheck.library.case_error import CaseError
 from crosscheck.library.code import function_of
 from crosscheck.library.find import shipped_folder
-from flexmb.scene.convert import to_struct
-from flexmb.scene.problems import SceneError, closest
-from flexmb.scene.reading import Unreadable, parse_toml, read_text
+from crosscheck.library.read_file import struct_of, text_of
+from flexmb.scene.problems import closest
 
 FILE, POINTS, MODEL = "measured.toml", "points.csv", "model.py"
 SERIES, MEASURED = "series", "measured"  # columns of points.csv; all others are conditions
@@ -167,20 +166,8 @@ def read_set(folder: Path) -> MeasuredSet:
     return MeasuredSet(folder.name, folder, content, points)
 
 
-def _text(file: Path) -> str:
-    try:
-        return read_text(file)
-    except (OSError, Unreadable) as error:
-        raise CaseError(f"{file}: {error}") from None
-
-
 def _content(file: Path) -> MeasuredFile:
-    try:
-        content = to_struct(parse_toml(_text(file)), MeasuredFile, str(file))
-    except SceneError as error:  # its message would call the file a scene
-        raise CaseError(f"{file}: {'; '.join(map(str, error.problems))}") from None
-    except (Unreadable, RecursionError, OverflowError) as error:
-        raise CaseError(f"{file}: {error}") from None
+    content = struct_of(file, MeasuredFile)
     for kind, items in (("input", content.inputs), ("series", content.series)):
         names = [item.name for item in items]
         for name in names:
@@ -214,7 +201,7 @@ def _refuse(file: Path, where: str, item: Any, sizes: Mapping[str, float], finit
 def _rows(file: Path) -> Iterator[list[str]]:
     """Line by line; CaseError where the csv module gives up, as it does at a cell of more than 131 072 letters."""
     try:
-        yield from csv.reader(io.StringIO(_text(file)))
+        yield from csv.reader(io.StringIO(text_of(file)))
     except csv.Error as error:
         raise CaseError(f"{file}: {error}: correct it, or write the file anew") from None
 

@@ -133,7 +133,6 @@ NOT_OF_USERS = {
     "crosscheck/cli/run.py:_conclude": "shows what it has just written",
     "crosscheck/cli/stability.py:stability": "shows what it has just written",
     "crosscheck/engines/kratos/library.py:_silence": "the file that takes everything",
-    "crosscheck/export/archive.py:_read": "files of the package",
     "crosscheck/export/archive.py:archive": "files of the package",
     "crosscheck/export/pages.py:collection_page": "files of the package", "crosscheck/library/digests.py": "digests",
     "crosscheck/library/find.py:shipped_tags": "tags of the shipped cases",
