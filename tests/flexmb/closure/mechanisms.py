@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
+import flexmb
 from flexmb.scene.build import SceneBuilder, s
 from flexmb.scene.shapes import beam_section
 
@@ -37,10 +38,20 @@ GRASHOF = FourBar()
 RATE = 3.826937  # rad/s, of its crank; steps and tolerances of tests go by it
 
 
-def bar(scene: SceneBuilder, name: str, length: float, *, modes: int = 0) -> SceneBuilder:
-    """A slender bar along x with a node "end": rigid, or a beam with modes, its node being "tip"."""
+def gap(system: flexmb.System, state: flexmb.State) -> float:
+    """The largest of all closures (m or rad)."""
+    return max(max(gap) for gap in system.closure_gaps(state).values())
+
+
+def largest_gap(system: flexmb.System, run: flexmb.Trajectory) -> float:
+    """Of all closures and samples (m or rad)."""
+    return max(gap(system, flexmb.State(*each)) for each in zip(run.q, run.u, run.t, strict=True))
+
+
+def bar(scene: SceneBuilder, name: str, length: float, *, modes: int | s.Modes = 0, **beam: Any) -> SceneBuilder:
+    """A slender bar along x with a node "tip": rigid, or a beam with modes."""
     if modes:
-        return scene.beam(name, length=length, elements=4, section=STEEL, modes=modes, points="line")
+        return scene.beam(name, length=length, elements=4, section=STEEL, modes=modes, **{"points": "line", **beam})
     mass = 0.78 * length
     inertia = (1e-5, mass * length**2 / 12.0, mass * length**2 / 12.0)
     return scene.rigid_body(name, mass=mass, com=(0.5 * length, 0, 0), inertia=inertia, nodes={"tip": (length, 0, 0)})
@@ -51,17 +62,25 @@ def four_bar(
     gravity: float = -9.81, modes: int = 0, off: float = 0.0, prescribed: s.Function | None = None, **place,
 ) -> s.Scene:  # fmt: skip
     """A four-bar in the x-y plane, cut at the pin between coupler and rocker; `off` spoils its initial angles (rad)."""
+    motion = {"prescribed": prescribed} if prescribed else {"angle": crank, "rate": rate}
+    settings = {"crank": crank, "closure": closure, "gravity": gravity, "off": off}
+    return four_bar_builder(motion, {"modes": modes}, lengths, **settings, **place).scene()
+
+
+def four_bar_builder(
+    drive: dict[str, Any], bars: dict[str, Any], lengths: FourBar = GRASHOF, *, crank: float = 1.0,
+    closure: str = "revolute", gravity: float = -9.81, off: float = 0.0, **place,
+) -> SceneBuilder:  # fmt: skip
+    """The same before it is a scene; `drive` is given to the crank's hinge, `bars` to `bar`."""
     coupler, rocker = lengths.angles(crank)
     scene = SceneBuilder("four-bar", gravity=(0.0, gravity, 0.0))
     for name, length in zip(("crank", "coupler", "rocker"), lengths[:3], strict=True):
-        bar(scene, name, length, modes=modes)
-    motion = {"prescribed": prescribed} if prescribed else {"angle": crank, "rate": rate}
-    scene.revolute("drive", "ground", "crank", **motion)
+        bar(scene, name, length, **bars)
+    scene.revolute("drive", "ground", "crank", **drive)
     scene.revolute("pin", "crank", "coupler", parent_node="tip", angle=coupler - crank + off)
     scene.revolute("pivot", "ground", "rocker", parent_position=(lengths.ground, 0.0, 0.0), angle=rocker - off)
     scene.closure("loop", closure, "coupler", "rocker", node_a="tip", node_b="tip", **place)
-    scene.marker("joint", "coupler", node="tip")
-    return scene.scene()
+    return scene.marker("joint", "coupler", node="tip")
 
 
 def slider_crank(

@@ -17,14 +17,6 @@ from tests.flexmb.closure import chains
 from tests.flexmb.closure import mechanisms as m
 
 
-def gap(system: flexmb.System, state: flexmb.State) -> float:
-    return max(max(gap) for gap in system.closure_gaps(state).values())
-
-
-def largest_gap(system: flexmb.System, run: flexmb.Trajectory) -> float:
-    return max(gap(system, system.state(*each)) for each in zip(run.q, run.u, run.t, strict=True))
-
-
 def test_a_closed_scene_is_left_as_it_is():
     scene = m.four_bar(rate=0.0)
     start = flexmb.compile(scene).initial_state
@@ -38,7 +30,7 @@ def test_a_closed_scene_is_left_as_it_is():
 def test_rough_coordinates_are_closed(off, modes):
     system = flexmb.compile(m.four_bar(off=off, modes=modes))
     start = system.initial_state
-    assert gap(system, start) < 1e-12
+    assert m.gap(system, start) < 1e-12
     assert np.linalg.norm(start.q - flexmb.System(system.scene).initial_state.q) < 3.0 * off
 
 
@@ -67,7 +59,7 @@ def test_random_loops(seed):
     scene = chains.with_closures(trees.random_scene(seed, recipe), rng, ["revolute", "spherical"])
     system = flexmb.compile(scene)
     start = system.initial_state
-    assert gap(system, start) < 1e-12
+    assert m.gap(system, start) < 1e-12
     dense = chains.constrained(scene, start.q, start.u)
     assert np.max(np.abs(dense.rate)) < 1e-12 * np.max(np.abs(dense.J)) * np.sum(np.abs(start.u))
 
@@ -82,25 +74,33 @@ def test_speeds_of_rigid_bodies_are_the_nearest_in_the_metric_of_kinetic_energy(
     assert np.max(np.abs(start.u - expected)) < 1e-9 * np.max(np.abs(expected))
 
 
-def test_a_loop_that_cannot_be_closed_is_refused_with_its_gap():
-    scene = m.four_bar(position_b=(0.0, 0.0, 0.1))
-    with pytest.raises(flexmb.ClosureError, match=r'closure "loop" \(gap 0\.1 m.*no coordinates close it'):
-        flexmb.simulate(scene, 1.0)
+DRIVE = s.Ramp(value=0.5 * np.pi, rate=0.6)
 
 
-def test_axes_that_come_out_opposite_are_refused():
-    scene = m.four_bar(quaternion_b=(0.0, 1.0, 0.0, 0.0))
-    with pytest.raises(flexmb.ClosureError, match="half a turn apart"):
-        flexmb.simulate(scene, 1.0)
-
-
-def test_prescribed_motions_that_contradict_each_other_are_refused():
+def driven_twice() -> s.Scene:
+    """A crank that turns, and a pivot that is driven to stand still."""
     scene = m.four_bar(prescribed=s.Ramp(value=1.0, rate=2.0))
     pivot = next(hinge for hinge in scene.hinges if hinge.name == "pivot")
-    angle = pivot.rotation.angle_rad
-    held = msgspec.structs.replace(pivot, rotation=s.AngularCoordinate(prescribed_rad=s.Constant(value=angle)))
-    scene = msgspec.structs.replace(scene, hinges=(*(h for h in scene.hinges if h is not pivot), held))
-    with pytest.raises(flexmb.ClosureError, match="no speeds keep it closed"):
+    still = s.AngularCoordinate(prescribed_rad=s.Constant(value=pivot.rotation.angle_rad))
+    hinges = (*(h for h in scene.hinges if h is not pivot), msgspec.structs.replace(pivot, rotation=still))
+    return msgspec.structs.replace(scene, hinges=hinges)
+
+
+REFUSED = {
+    "a gap": (m.four_bar(position_b=(0.0, 0.0, 0.1)), r'closure "loop" \(gap 0\.1 m.*no coordinates close it'),
+    "opposite axes": (m.four_bar(quaternion_b=(0.0, 1.0, 0.0, 0.0)), "half a turn apart"),
+    "contradictory drives": (driven_twice(), "no speeds keep it closed"),
+    "rigid bars, a tilted pin": (
+        m.tilted_four_bar(flexible=False, drive=None),
+        r'"c" leave none of the 3 free speeds: the mechanism is locked',
+    ),
+    "the same, driven": (m.tilted_four_bar(flexible=False, drive=DRIVE), r'closure "c" .*the mechanism is locked'),
+}
+
+
+@pytest.mark.parametrize(("scene", "why"), REFUSED.values(), ids=REFUSED)
+def test_what_cannot_be_closed_or_moved_is_refused_by_name(scene, why):
+    with pytest.raises(flexmb.ClosureError, match=why):
         flexmb.simulate(scene, 1.0)
 
 
@@ -121,15 +121,12 @@ def test_the_rigid_four_bar_with_a_tilted_pin_is_locked():
         flexmb.simulate(m.tilted_four_bar(flexible=False, drive=s.Ramp(value=0.5 * np.pi, rate=0.6)), 1.0)
 
 
-DRIVE = s.Ramp(value=0.5 * np.pi, rate=0.6)
-
-
 def test_the_flexible_four_bar_with_a_tilted_pin_runs():
     """Its drive does what bars store: work of the drive equals the gain of energy."""
     system = flexmb.compile(m.tilted_four_bar(flexible=True, drive=DRIVE))
     run = flexmb.simulate(system, 0.2, rtol=1e-7, atol=1e-9, samples=11)
     assert run.finished, run.message
-    assert largest_gap(system, run) < 1e-10
+    assert m.largest_gap(system, run) < 1e-10
     assert np.max(np.abs(run.energy_drift)) < 1e-9 * run.energy_scale
     assert run.work[-1] > 0.5 * run.energy["strain"][-1] > 0.0
     # Without the tilt the bars of a parallelogram turn together and stay straight, as far as the run knows its modes:
@@ -146,7 +143,7 @@ def test_the_flexible_four_bar_turns_around():
     system = flexmb.compile(m.tilted_four_bar(flexible=True, drive=DRIVE))
     run = flexmb.simulate(system, 2.0 * np.pi / 0.6, rtol=1e-6, atol=1e-8, samples=101)
     assert run.finished, run.message
-    assert largest_gap(system, run) < 1e-10
+    assert m.largest_gap(system, run) < 1e-10
     assert np.max(np.abs(run.energy_drift)) < 1e-7 * run.energy_scale
     there = run.markers["pin"].position
     assert np.max(np.abs(there[-1] - there[0])) < 1e-4 < 1e-3 < np.max(there[:, 2])
@@ -210,8 +207,7 @@ def test_what_is_not_supported_is_refused_with_a_remedy():
 def test_stabilisation_holds_a_drift_that_projection_does_not_have():
     system = flexmb.compile(m.four_bar())
     runs = {rate: flexmb.simulate(system, 10.0, "rk4", step=0.005, samples=21, stabilise=rate) for rate in (0.0, 20.0)}
-    drift = {rate: max(gap(system, system.state(q, u)) for q, u in zip(run.q, run.u, strict=True))
-             for rate, run in runs.items()}  # fmt: skip
+    drift = {rate: m.largest_gap(system, run) for rate, run in runs.items()}
     assert all(run.finished for run in runs.values())
     assert drift[0.0] < 1e-12 < drift[20.0] < 1e-5
 
@@ -238,3 +234,24 @@ def test_stabilisation_needs_closures_and_a_rate():
         flexmb.simulate(msgspec.structs.replace(m.four_bar(), closures=()), 1.0, stabilise=1.0)
     with pytest.raises(ValueError, match="positive rate"):
         flexmb.simulate(m.four_bar(), 1.0, stabilise=-1.0)
+
+
+NO_STATES = {
+    "short": np.zeros(2), "long": np.zeros(10**5), "2-D": np.zeros((1, 7)), "complex": np.zeros(7) + 0j,
+    "not finite": np.full(7, np.nan), "None": None,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("y", NO_STATES.values(), ids=NO_STATES)
+@pytest.mark.parametrize("method", ["motion", "composite_motion", "gaps", "determined"])
+def test_states_that_do_not_fit_are_refused(method, y):
+    closures = flexmb.compile(m.four_bar()).closures
+    with pytest.raises((ValueError, TypeError), match="y: |q\\["):
+        getattr(closures, method)(0.0, y)
+
+
+@pytest.mark.parametrize("call", [flexmb.compile, lambda what: flexmb.simulate(what, 1.0)])
+@pytest.mark.parametrize("what", ["scene.toml", None, {"name": "scene"}])
+def test_what_is_no_scene_is_named(call, what):
+    with pytest.raises(TypeError, match=f"a Scene is needed, not {type(what).__name__}: load_scene reads one"):
+        call(what)

@@ -23,15 +23,8 @@ UNIT_ROUNDOFF = 2.0**-53
 
 def connected() -> s.Scene:
     """A flexible four-bar with a motor, a damped strut to the ground, a bushing, and a spring and friction in pins."""
-    coupler, rocker = m.GRASHOF.angles(1.0)
-    scene = fm.SceneBuilder("connected", gravity=(0.0, -9.81, 0.0))
-    for name, length in zip(("crank", "coupler", "rocker"), m.GRASHOF[:3], strict=True):
-        m.bar(scene, name, length, modes=1)
     torque = s.Sine(amplitude=2.0, angular_frequency_rad_s=3.0, phase_rad=0.4)
-    scene.revolute("drive", "ground", "crank", angle=1.0, rate=2.0, torque=torque)
-    scene.revolute("pin", "crank", "coupler", parent_node="tip", angle=coupler - 1.0)
-    scene.revolute("pivot", "ground", "rocker", parent_position=(m.GRASHOF.ground, 0.0, 0.0), angle=rocker)
-    scene.closure("loop", "revolute", "coupler", "rocker", node_a="tip", node_b="tip")
+    scene = m.four_bar_builder({"angle": 1.0, "rate": 2.0, "torque": torque}, {"modes": 1})
     scene.spring_damper("strut", "ground", "coupler", node_b="tip", free_length=0.8, stiffness=40.0, damping=3.0)
     scene.bushing(
         "mount", "crank", "rocker", stiffness=np.diag([1.0, 2.0, 3.0, 4.0, 5.0, 6.0]), damping=0.1 * np.eye(6)

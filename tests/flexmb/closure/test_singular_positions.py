@@ -43,16 +43,9 @@ def test_windows_stay_parallel_where_all_bars_lie_on_one_line(count, speed, sett
 
 
 @pytest.mark.parametrize("settings", ["dop853", "rk4"])
-@pytest.mark.parametrize("count", [1, 2, 5])
+@pytest.mark.parametrize("count", [1, 2, 5, *(pytest.param(n, marks=pytest.mark.slow) for n in (10, 40))])
 def test_the_benchmark_of_the_windows(count, settings):
     """Ten seconds by default settings, to 1e-6 rad, as the energy integral says."""
-    _stays_parallel(count, 1.0, 10.0, SETTINGS[settings], 1e-6)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("settings", ["dop853", "rk4"])
-@pytest.mark.parametrize("count", [10, 40])
-def test_the_benchmark_of_many_windows(count, settings):
     _stays_parallel(count, 1.0, 10.0, SETTINGS[settings], 1e-6)
 
 

@@ -10,29 +10,19 @@ from crosscheck.library.find import shipped_folder
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.scene import schema as s
 from flexmb.scene.files import load_scene
-from flexmb.scene.shapes import beam_section
 from tests.bounds import observed_order
 from tests.flexmb.closure import mechanisms as m
 from tests.flexmb.closure.test_jacobian import connected
 
 STIFF = [name for name, integrator in INTEGRATORS.items() if integrator.linearises]
 ADAPTIVE = [name for name in STIFF if not INTEGRATORS[name].fixed]
-STEEL = beam_section(E=2e11, G=8e10, A=1e-4, Iy=8e-10, Iz=8e-10, rho=7800.0)
 
 
 def stiff_four_bar(level: s.Level = "full") -> s.Scene:
     """A four-bar of beams with static shapes, bending and axial modes, damped: up to 21,000 rad/s."""
-    bars = m.GRASHOF
-    coupler, rocker = bars.angles(1.0)
     modes = s.Modes(count=2, families=("bending_z", "axial"), static=True, damping_ratio=0.02)
-    scene = fm.SceneBuilder("stiff four-bar", gravity=(0.0, -9.81, 0.0))
-    for name, length in zip(("crank", "coupler", "rocker"), bars[:3], strict=True):
-        scene.beam(name, length=length, elements=4, section=STEEL, modes=modes, level=level)
-    scene.revolute("drive", "ground", "crank", angle=1.0, rate=m.RATE)
-    scene.revolute("pin", "crank", "coupler", parent_node="tip", angle=coupler - 1.0)
-    scene.revolute("pivot", "ground", "rocker", parent_position=(bars.ground, 0.0, 0.0), angle=rocker)
-    scene.closure("loop", "revolute", "coupler", "rocker", node_a="tip", node_b="tip")
-    return scene.marker("joint", "coupler", node="tip").scene()
+    beams = {"modes": modes, "level": level, "points": "section"}
+    return m.four_bar_builder({"angle": 1.0, "rate": m.RATE}, beams).scene()
 
 
 SMOOTH = {
@@ -42,11 +32,6 @@ SMOOTH = {
     "connected": connected,
     "Bennett": m.bennett,
 }
-
-
-def largest_gap(system: fm.System, run: fm.Trajectory) -> float:
-    states = (fm.State(q, u, t) for q, u, t in zip(run.q, run.u, run.t, strict=True))
-    return max(max(gap) for state in states for gap in system.closure_gaps(state).values())
 
 
 @pytest.mark.parametrize("name", SMOOTH)
@@ -65,7 +50,7 @@ def test_adaptive_methods_agree_with_dop853(name, method):
         assert np.abs(done.loads[key] - load)[known].max(initial=0.0) < 1e-5 * size, key
     assert np.abs(done.work - exact.work).max() < 1e-6 * max(1.0, np.ptp(exact.work))
     assert np.abs(done.energy_drift).max() < 1e-6 * done.energy_scale
-    assert largest_gap(system, done) < 1e-12
+    assert m.largest_gap(system, done) < 1e-12
 
 
 @pytest.mark.parametrize(("method", "order"), [("radau5", 5), ("exponential", 5)])
@@ -121,7 +106,7 @@ def alpha_errors(name: str, t_end: float, steps: np.ndarray) -> list[float]:
     system = fm.compile(SMOOTH[name]())
     exact = fm.simulate(system, t_end, rtol=1e-12, atol=1e-12, samples=2)
     runs = [fm.simulate(system, t_end, "generalised_alpha", step=h, samples=2, rtol=1e-9) for h in steps]
-    assert max(largest_gap(system, run) for run in runs) < 1e-12
+    assert max(m.largest_gap(system, run) for run in runs) < 1e-12
     return [np.abs(np.r_[run.q[-1] - exact.q[-1], run.u[-1] - exact.u[-1]]).max() for run in runs]
 
 
