@@ -2,6 +2,7 @@
 
 import functools
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -50,11 +51,35 @@ def test_run_writes_everything_and_ends_with_zero(
     assert (tmp_path / "b" / "verdicts.json").read_bytes() == (tmp_path / "verdicts.json").read_bytes()
 
 
-def test_an_unknown_case_ends_with_two(runner: CliRunner, tmp_path: Path) -> None:
-    result = runner.invoke(cli.app, ["run", "nowhere", "--out", str(tmp_path)], env=WIDE)
-    assert result.exit_code == 2
-    assert "crosscheck list" in result.output
-    assert runner.invoke(cli.app, ["report", str(tmp_path / "none.jsonl")], env=WIDE).exit_code == 2
+def ends(runner: CliRunner, words: list[object], code: int, said: str) -> None:
+    """A command of these words ends with the exit code and says so."""
+    result = runner.invoke(cli.app, [str(word) for word in words], env=WIDE)
+    assert (result.exit_code, said in result.output) == (code, True), result.output
+
+
+def test_messages_say_what_was_meant(runner: CliRunner, tmp_path: Path) -> None:
+    """Of a case that is unknown or misspelt, of several where one is asked for, of files that are missing or none."""
+    ends(runner, ["run", "nowhere", "--out", tmp_path], 2, "crosscheck list")
+    ends(runner, ["run", "four_baer", "--out", tmp_path], 2, 'did you mean "four_bar"?')
+    ends(runner, ["report", tmp_path / "none.jsonl"], 2, "")
+    ends(runner, ["verify", "canonical", tmp_path / "my.csv"], 2, "name one of")
+    (tmp_path / "run.toml").write_text("titel = 1\n", encoding="utf-8")
+    result = runner.invoke(cli.app, ["run", str(tmp_path), "--out", str(tmp_path)], env=WIDE)
+    assert (result.exit_code, "titel" in result.output, "scene" in result.output) == (2, True, False), result.output
+    for word in ("Exit code", "resumes", "canonical", "report.html", "--accept", "--strict", "--time-limit"):
+        ends(runner, ["run", "--help"], 0, word)
+
+
+NUMBERS = [("--time-limit", limit, "give a positive number of seconds") for limit in ("nan", "inf", "0", "-1")]
+NUMBERS += [("--jobs", count, "--jobs") for count in ("0", "-1", "many")]  # with none, a run would wait for ever
+
+
+@pytest.mark.parametrize(("option", "number", "said"), NUMBERS)
+@pytest.mark.parametrize("command", [("run", CASE), ("stability", "free_spin")], ids=["run", "stability"])
+def test_limits_are_positive_numbers(
+    runner: CliRunner, tmp_path: Path, command: tuple[object, ...], option: str, number: str, said: str
+) -> None:
+    ends(runner, [*command, option, number, "--out", tmp_path], 2, said)
 
 
 def test_engines_are_listed_with_how_to_install_them(runner: CliRunner, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -64,12 +89,6 @@ def test_engines_are_listed_with_how_to_install_them(runner: CliRunner, monkeypa
     assert "not installed" in output
     assert "pip install 'flexmb[absent]'" in output
     assert "a pendulum" in output
-
-
-def test_help_teaches(runner: CliRunner) -> None:
-    output = runner.invoke(cli.app, ["run", "--help"], env=WIDE).output
-    for word in ("Exit code", "resumes", "canonical", "report.html", "--accept", "--strict", "--time-limit"):
-        assert word in output
 
 
 def csv_of(path: Path, gravity_factor: float = 1.0, effort: int = 3, drop: str = "") -> Path:
@@ -93,14 +112,24 @@ def verify(runner: CliRunner, *words: str) -> tuple[int, str]:
     return result.exit_code, result.output
 
 
-def test_a_right_csv_agrees(runner: CliRunner, tmp_path: Path) -> None:
-    code, output = verify(runner, str(csv_of(tmp_path / "my.csv")))
-    assert (code, "All 2 verdicts are as expected" in output) == (0, True), output
-
-
-def test_a_wrong_csv_differs(runner: CliRunner, tmp_path: Path) -> None:
-    code, output = verify(runner, str(csv_of(tmp_path / "my.csv", gravity_factor=1.001)))
-    assert (code, "differ, expected agree" in output) == (1, True), output
+@pytest.mark.parametrize(
+    ("gravity_factor", "change", "code", "said"),
+    [
+        (1.0, str, 0, "All 2 verdicts are as expected"),
+        (1.001, str, 1, "differ, expected agree"),
+        (1.0, lambda text: text.replace("tip.", "tap."), 1, "check the name"),
+        (1.0, lambda text: text.replace("tip.px", "tip.x", 1), 2, "no whole group contains tip.x"),
+        (1.0, lambda text: text.replace("t,", "time,", 1), 2, 'the first column must be "t"'),
+        (1.0, lambda text: "\n".join(text.splitlines()[:-3]) + "\n", 2, "do not cover the case's"),
+        (1.0, lambda text: "", 2, "cannot be read"),
+    ],
+)
+def test_a_csv_is_judged_or_refused(
+    runner: CliRunner, tmp_path: Path, gravity_factor: float, change: Callable[[str], str], code: int, said: str
+) -> None:
+    file = csv_of(tmp_path / "my.csv", gravity_factor)
+    file.write_text(change(file.read_text(encoding="utf-8")), encoding="utf-8")
+    ends(runner, ["verify", CASE, file, "--engine", "fine"], code, said)
 
 
 def test_a_coarse_csv_gives_its_own_uncertainty(runner: CliRunner, tmp_path: Path) -> None:
@@ -112,29 +141,6 @@ def test_a_coarse_csv_gives_its_own_uncertainty(runner: CliRunner, tmp_path: Pat
     assert "differ" in verify(runner, str(rough))[1]
     code, output = verify(runner, str(rough), "--coarse", str(rougher))
     assert (code, "unresolved, expected agree" in output) == (1, True), output
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (lambda text: text.replace("tip.px", "tip.x", 1), "no whole group contains tip.x"),
-        (lambda text: text.replace("t,", "time,", 1), 'the first column must be "t"'),
-        (lambda text: "\n".join(text.splitlines()[:-3]) + "\n", "do not cover the case's"),
-        (lambda text: "", "cannot be read"),
-    ],
-)
-def test_a_csv_that_cannot_be_compared_ends_with_two(runner: CliRunner, tmp_path: Path, change, message: str) -> None:
-    file = csv_of(tmp_path / "my.csv")
-    file.write_text(change(file.read_text(encoding="utf-8")), encoding="utf-8")
-    code, output = verify(runner, str(file))
-    assert (code, message in output) == (2, True), output
-
-
-def test_a_wrong_name_is_not_green(runner: CliRunner, tmp_path: Path) -> None:
-    file = csv_of(tmp_path / "my.csv")
-    file.write_text(file.read_text(encoding="utf-8").replace("tip.", "tap."), encoding="utf-8")
-    code, output = verify(runner, str(file))
-    assert (code, "check the name" in output) == (1, True), output
 
 
 def test_a_template_has_the_times_and_columns(runner: CliRunner, tmp_path: Path) -> None:
@@ -155,18 +161,35 @@ def test_list_shows_the_shipped_cases(runner: CliRunner, monkeypatch: pytest.Mon
     assert "fine, stepper" in output
 
 
-@pytest.mark.parametrize("limit", ["nan", "inf", "0", "-1"])
-def test_a_time_limit_is_a_positive_number(runner: CliRunner, tmp_path: Path, limit: str) -> None:
-    for words in (["run", str(CASE)], ["stability", "free_spin"]):
-        result = runner.invoke(cli.app, [*words, "--time-limit", limit, "--out", str(tmp_path)], env=WIDE)
-        assert (result.exit_code, "give a positive number of seconds" in result.output) == (2, True)
+def two_cases(folder: Path, more: str | None = None) -> tuple[Path, Path]:
+    """The small case and a copy of it, which compares nothing if `more` stands where its variants and comparisons do.
+
+    What is there by then is one variant of one engine.
+    """
+    case = copy_case(folder)
+    other = case.with_name("other")
+    shutil.copytree(case, other)
+    if more is not None:
+        file = other / "run.toml"
+        head = file.read_text(encoding="utf-8").split("[[variant]]")[0]
+        file.write_text(f'{head}[[variant]]\nname = "a"\nengines = ["fine"]\n{more}', encoding="utf-8")
+    return case, other
+
+
+def rigid_compared(folder: Path, among: str) -> Path:
+    """The small case with `among` in its comparison of the rigid variant."""
+    case = copy_case(folder)
+    text = (case / "run.toml").read_text(encoding="utf-8")
+    assert text.count('variant = "rigid"\ngoals') == 1
+    text = text.replace('variant = "rigid"\ngoals', f"{among}\ngoals")
+    (case / "run.toml").write_text(text, encoding="utf-8")
+    return case
 
 
 def test_a_run_reports_what_it_was_asked_for_and_report_shows_all(runner: CliRunner, tmp_path: Path) -> None:
     """Two cases into one folder: each run judges its own, the archive holds both."""
-    folder, out = copy_case(tmp_path), tmp_path / "out"
-    other = folder.with_name("other")
-    shutil.copytree(folder, other)
+    folder, other = two_cases(tmp_path)
+    out = tmp_path / "out"
     for case in (folder, other):
         assert runner.invoke(cli.app, ["run", str(case), "--out", str(out)], env=WIDE).exit_code == 0
     assert "pendulum/single" not in (out / "summary.md").read_text(encoding="utf-8")
@@ -177,96 +200,49 @@ def test_a_run_reports_what_it_was_asked_for_and_report_shows_all(runner: CliRun
     assert "pendulum/single" in summary and "pendulum/other" in summary
 
 
-@pytest.mark.parametrize("count", ["0", "-1", "many"])
-def test_there_is_at_least_one_worker(runner: CliRunner, tmp_path: Path, count: str) -> None:
-    """With none, a run would wait for ever."""
-    for words in (["run", str(CASE)], ["stability", "free_spin"]):
-        result = runner.invoke(cli.app, [*words, "--jobs", count, "--out", str(tmp_path)], env=WIDE)
-        assert (result.exit_code, "--jobs" in result.output) == (2, True), result.output
-
-
 def test_two_folders_of_one_name_are_refused(runner: CliRunner, tmp_path: Path) -> None:
     """Only one of them would be run, and the other would be green with it."""
     one, two = copy_case(tmp_path / "a"), copy_case(tmp_path / "b")
-    words = ["--out", str(tmp_path / "out"), "--jobs", "2"]
-    result = runner.invoke(cli.app, ["run", str(one), str(two), *words], env=WIDE)
-    assert (result.exit_code, "are both called pendulum/single" in result.output) == (2, True), result.output
-    assert runner.invoke(cli.app, ["run", str(one), str(one), *words], env=WIDE).exit_code == 0
+    words = ["--out", tmp_path / "out", "--jobs", "2"]
+    ends(runner, ["run", one, two, *words], 2, "are both called pendulum/single")
+    ends(runner, ["run", one, one, *words], 0, "")
 
 
 def test_accepting_nothing_is_not_green(runner: CliRunner, tmp_path: Path) -> None:
     """Two cases, one without a part for the engine: all verdicts are as expected, and no figures were written."""
-    folder = copy_case(tmp_path)
-    other = folder.with_name("other")
-    shutil.copytree(folder, other)
-    file = other / "run.toml"
-    head = file.read_text(encoding="utf-8").split("[[variant]]")[0]
-    file.write_text(
-        head + '[[variant]]\nname = "a"\nengines = ["fine"]\n\n'
-        '[[conservation]]\nvariant = "a"\nquantity = "energy"\nlimit = 1e-3\n',
-        encoding="utf-8",
-    )
-    words = ["--accept", "-e", "stepper", "--out", str(tmp_path / "out"), "--jobs", "2"]
-    result = runner.invoke(cli.app, ["run", str(folder), str(other), *words], env=WIDE)
-    assert (result.exit_code, "nothing was compared in pendulum/other" in result.output) == (1, True), result.output
+    kept = '\n[[conservation]]\nvariant = "a"\nquantity = "energy"\nlimit = 1e-3\n'
+    folder, other = two_cases(tmp_path, kept)
+    words = ["--accept", "-e", "stepper", "--out", tmp_path / "out", "--jobs", "2"]
+    ends(runner, ["run", folder, other, *words], 1, "nothing was compared in pendulum/other")
     assert not (folder / "accepted.toml").exists()
 
 
 def test_a_case_in_which_nothing_is_compared_is_named(runner: CliRunner, tmp_path: Path) -> None:
-    folder = copy_case(tmp_path)
-    other = folder.with_name("other")
-    shutil.copytree(folder, other)
-    text = (other / "run.toml").read_text(encoding="utf-8")
-    alone = text.split("[[variant]]")[0] + '[[variant]]\nname = "a"\nengines = ["fine"]\n'
-    (other / "run.toml").write_text(alone, encoding="utf-8")
-    words = ["--out", str(tmp_path / "out"), "--jobs", "2"]
-    result = runner.invoke(cli.app, ["run", str(folder), str(other), *words], env=WIDE)
-    assert (result.exit_code, "pendulum/other: nothing was compared" in result.output) == (0, True), result.output
-    assert runner.invoke(cli.app, ["run", str(other), *words], env=WIDE).exit_code == 1
+    folder, other = two_cases(tmp_path, "")
+    words = ["--out", tmp_path / "out", "--jobs", "2"]
+    ends(runner, ["run", folder, other, *words], 0, "pendulum/other: nothing was compared")
+    ends(runner, ["run", other, *words], 1, "")
 
 
-@pytest.mark.parametrize("asked", [["second"], ["fine", "sloppy"]])
-def test_an_engine_without_a_part_is_no_request(runner: CliRunner, tmp_path: Path, asked: list[str]) -> None:
+@pytest.mark.parametrize("engines", [["second"], ["fine", "sloppy"]])
+def test_an_engine_without_a_part_is_no_request(runner: CliRunner, tmp_path: Path, engines: list[str]) -> None:
     """It takes part neither by name nor, as a foreign one, where engines of a variant are compared; none would tell."""
-    folder = copy_case(tmp_path)
-    file = folder / "run.toml"
-    text = file.read_text(encoding="utf-8")
-    assert text.count('variant = "rigid"\ngoals') == 1
     pair = 'a = { variant = "rigid", engine = "fine" }\nb = { variant = "rigid", engine = "stepper" }'
-    named = text.replace('variant = "rigid"\ngoals', f"{pair}\ngoals")
-    file.write_text(named, encoding="utf-8")
-    engines = [word for name in asked for word in ("-e", name)]
-    result = runner.invoke(cli.app, ["run", str(folder), *engines, "--out", str(tmp_path / "out")], env=WIDE)
-    assert (result.exit_code, f"a part for engine {asked[-1]}" in result.output) == (2, True), result.output
+    words = [word for name in engines for word in ("-e", name)]
+    folder = rigid_compared(tmp_path, pair)
+    ends(runner, ["run", folder, *words, "--out", tmp_path / "out"], 2, f"a part for engine {engines[-1]}")
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("asked", ["second", "sloppy"])
+@pytest.mark.parametrize(("joining", "code"), [("second", 0), ("sloppy", 1)])
 def test_an_engine_that_joins_is_compared_with_those_that_a_case_lists(
-    runner: CliRunner, tmp_path: Path, asked: str
+    runner: CliRunner, tmp_path: Path, joining: str, code: int
 ) -> None:
-    folder = copy_case(tmp_path)
-    file = folder / "run.toml"
-    text = file.read_text(encoding="utf-8")
-    assert text.count('variant = "rigid"\ngoals') == 1
-    named = text.replace('variant = "rigid"\ngoals', 'variant = "rigid"\nengines = ["fine", "stepper"]\ngoals')
-    file.write_text(named, encoding="utf-8")
-    words = ["-e", "fine", "-e", asked, "--out", str(tmp_path / "out")]
+    folder = rigid_compared(tmp_path, 'variant = "rigid"\nengines = ["fine", "stepper"]')
+    words = ["-e", "fine", "-e", joining, "--out", str(tmp_path / "out")]
     result = runner.invoke(cli.app, ["run", str(folder), *words], env=WIDE)
-    assert (result.exit_code, f"{asked} –" in result.output or f"– {asked}" in result.output) == (
-        (0, False) if asked == "second" else (1, True)
-    ), result.output
-
-
-def test_messages_say_what_was_meant(runner: CliRunner, tmp_path: Path) -> None:
-    """Of a misspelt case, of several cases where one is asked for, and of a run file that is none."""
-    result = runner.invoke(cli.app, ["run", "four_baer", "--out", str(tmp_path)], env=WIDE)
-    assert (result.exit_code, 'did you mean "four_bar"?' in result.output) == (2, True), result.output
-    result = runner.invoke(cli.app, ["verify", "canonical", str(tmp_path / "my.csv")], env=WIDE)
-    assert (result.exit_code, "name one of" in result.output) == (2, True), result.output
-    (tmp_path / "run.toml").write_text("titel = 1\n", encoding="utf-8")
-    result = runner.invoke(cli.app, ["run", str(tmp_path), "--out", str(tmp_path)], env=WIDE)
-    assert (result.exit_code, "titel" in result.output, "scene" in result.output) == (2, True, False), result.output
+    named = f"{joining} –" in result.output or f"– {joining}" in result.output
+    assert (result.exit_code, named) == (code, code == 1), result.output
 
 
 def test_a_template_takes_no_file_s_place(runner: CliRunner, tmp_path: Path) -> None:
