@@ -25,7 +25,9 @@ from flexmb.scene.sections import inertia_on_axis, restated, stiffness_on_axis, 
 from flexmb.scene.sections import matrix as section_matrix
 from flexmb.scene.shapes import beam_section
 from flexmb.scene.tree import coordinates, with_coordinates
+from flexmb.system.system import System
 from flexmb.system.watches import WAIVERS
+from flexmb.tables.state import State
 
 STRUCTS = {struct.__struct_config__.tag: struct for struct in get_args(s.Hinge)}
 # A new kind is none of these, so that the random scenes of a seed stay what they are; it is drawn by `LATER_KINDS`.
@@ -432,3 +434,11 @@ def _loads(scene: SceneBuilder, rng: Generator, nodes: list[list[str]]) -> None:
         add(f"l{i}", **seat, direction=direction(rng), frame=frame, function=_profile(rng, 3.0))
 
 
+def deformed(system: System, scale: float) -> State:
+    """The initial state with modal coordinates and rates times `scale`."""
+    state = system.initial_state
+    for body in system.scene.bodies:
+        if not isinstance(body, s.RigidBody):
+            state.q[system.coordinate(f"{body.name}.modes")] *= scale
+            state.u[system.speed(f"{body.name}.modes")] *= scale
+    return state

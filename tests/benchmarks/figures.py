@@ -18,9 +18,10 @@ from flexmb.frisch.nested_system import nested_system
 from tests.benchmarks import cost_figures
 from tests.benchmarks.rivals import flexible_chain, interleaved, rigid_chain
 from tests.benchmarks.test_nested import nested, recursion
-from tests.flexmb.frisch.scenes import at_level, deformed, packed
+from tests.flexmb.frisch.scenes import at_level, packed
 from tests.flexmb.frisch.test_errata import ORDER, tree
 from tests.repo.project import ROOT
+from tests.trees import deformed
 
 FOLDER = ROOT / "docs" / "pictures"
 SCALES = 10.0 ** -np.arange(0.0, 5.5, 0.5)

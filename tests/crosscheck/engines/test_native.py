@@ -22,8 +22,8 @@ from flexmb.scene.schema import Scene
 from tests import trees
 from tests.bounds import algebra
 from tests.flexmb.control.scenes import rotor
-from tests.flexmb.control.test_attitude import craft
 from tests.flexmb.control.test_closed_chains import GRASHOF, LAGGING, controlled
+from tests.flexmb.control.test_satellite import craft
 from tests.flexmb.frisch.scenes import clamped
 
 RECURSION, FRISCH, PRINT = "native", "native-frisch", "native-frisch-as-printed"
@@ -216,19 +216,12 @@ class Willing:
         return Support("exact")
 
 
-def test_an_engine_without_controllers_refuses_them() -> None:
+def test_our_engines_take_controllers_and_one_that_knows_none_refuses_them() -> None:
     refused = CheckedEngine(Willing()).supports(rotor(LAW))  # type: ignore[arg-type]
     assert refused.kind == "no"
+    assert all(CheckedEngine(own).supports(rotor(LAW)).kind == "exact" for own in (NativeEngine(), radau5()))
     assert '"law": the adapter of engine willing knows no controllers' in refused.reason
     assert CheckedEngine(Willing()).supports(rotor()).kind == "exact"  # type: ignore[arg-type]
-
-
-def test_the_native_engine_runs_them() -> None:
-    assert CheckedEngine(NativeEngine()).supports(rotor(LAW)).kind == "exact"
-
-
-def test_implicit_methods_take_continuous_ones() -> None:
-    assert CheckedEngine(radau5()).supports(rotor(LAW)).kind == "exact"
 
 
 @pytest.mark.parametrize("name", ["native-radau5", "native-exponential", "native-generalised-alpha"])
@@ -267,11 +260,8 @@ def eventful() -> Scene:
 
 
 @pytest.mark.parametrize("name", ["pinocchio", "mujoco", "exudyn", "exudyn-beam", "drake", "opensim"])
-def test_peers_refuse_scenes_with_events(name: str) -> None:
+def test_peers_refuse_scenes_with_events_and_our_own_algorithms_run_them(name: str) -> None:
+    for own in ("native", "native-composite", "native-frisch", "native-generalised-alpha"):
+        assert CheckedEngine(engine(own)).supports(eventful()).kind == "exact"
     support = CheckedEngine(engine(name)).supports(eventful())
     assert support.kind == "no" and "caught" in support.reason and "knows no events" in support.reason
-
-
-@pytest.mark.parametrize("name", ["native", "native-composite", "native-frisch", "native-generalised-alpha"])
-def test_our_own_algorithms_run_them(name: str) -> None:
-    assert CheckedEngine(engine(name)).supports(eventful()).kind == "exact"

@@ -36,16 +36,6 @@ def at_level(scene: s.Scene, level: s.Level) -> s.Scene:
     return msgspec.structs.replace(scene, bodies=bodies)
 
 
-def deformed(system: flexmb.System, scale: float) -> flexmb.State:
-    """The initial state with modal coordinates and rates times `scale`."""
-    state = system.initial_state
-    for body in system.scene.bodies:
-        if not isinstance(body, s.RigidBody):
-            state.q[system.coordinate(f"{body.name}.modes")] *= scale
-            state.u[system.speed(f"{body.name}.modes")] *= scale
-    return state
-
-
 def packed(state: flexmb.State) -> np.ndarray:
     """y = [q, u, work]."""
     return np.concatenate([state.q, state.u, [0.0]])

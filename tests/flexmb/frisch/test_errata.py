@@ -18,7 +18,8 @@ from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.shapes import beam_section
 from tests.bounds import algebra
-from tests.flexmb.frisch.scenes import CLAMPED, clamped, deformed, expanded, packed, random_scene
+from tests.flexmb.frisch.scenes import CLAMPED, clamped, expanded, packed, random_scene
+from tests.trees import deformed
 
 TREE = replace(CLAMPED, bodies=6, point_masses=1)
 SCALES = 10.0 ** -np.arange(1.5, 5.0)  # of random modal coordinates and rates up to 0.03

@@ -16,7 +16,8 @@ from flexmb.entry import observation
 from flexmb.frisch.nested_system import NestedMotion, NestedSystem, Partitions
 from tests import trees
 from tests.bounds import algebra, backward_error
-from tests.flexmb.frisch.scenes import SMALL, deformed, packed, random_scene
+from tests.flexmb.frisch.scenes import SMALL, packed, random_scene
+from tests.trees import deformed
 from tests.unlocked import unlocked
 
 RECIPES = {

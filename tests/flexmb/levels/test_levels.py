@@ -1,7 +1,9 @@
-"""Fidelity levels: where they coincide exactly, and how fast they part."""
+"""Fidelity levels: where they coincide exactly, and how fast they part. Level `ruthless` needs a low spin: the
+flapping frequencies of docs/notation.md, and a published one."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import msgspec
@@ -9,13 +11,17 @@ import numpy as np
 import pytest
 
 import flexmb
+import flexmb as fm
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.modal_data import inertia_points
+from flexmb.scene.shapes import beam_section
 from flexmb.system.system import System
 from flexmb.tables.state import DynamicsError
+from flexmb.typing import Real
 from tests import trees
 from tests.bounds import algebra, gamma, observed_order, relative
+from tests.repo.project import ROOT
 
 RECIPE = replace(trees.FULL, bodies=5, carriers=("modal", "beam", "floating", "rigid"))
 SCALES = np.array([1e-1, 1e-2, 1e-3, 1e-4, 1e-5])
@@ -27,16 +33,6 @@ def at_level(scene: s.Scene, level: s.Level) -> s.Scene:
               for body in scene.bodies]  # fmt: skip
     states = scene.modal_states if level != "rigid" else ()
     return msgspec.structs.replace(scene, bodies=tuple(bodies), modal_states=states)
-
-
-def with_deformation(system: System, scale: float) -> flexmb.State:
-    """The initial state with modal coordinates and rates times `scale`."""
-    state = system.initial_state
-    for body in system.scene.bodies:
-        if not isinstance(body, s.RigidBody):
-            state.q[system.coordinate(f"{body.name}.modes")] *= scale
-            state.u[system.speed(f"{body.name}.modes")] *= scale
-    return state
 
 
 @pytest.fixture(scope="module", params=SEEDS)
@@ -53,7 +49,7 @@ def systems(scene) -> dict[str, System]:
 def test_levels_coincide_at_rest_shape(systems, level):
     """Jain & Rodriguez (B1): undeformed and with the modes still, all are the same equations, in other orders."""
     full, other = systems["full"], systems[level]
-    state = with_deformation(full, 0.0)
+    state = trees.deformed(full, 0.0)
     bound = algebra(full.nu, len(full.body_names), 15)
     M = full.mass_matrix(state)
     assert relative(M, other.mass_matrix(state)) <= bound
@@ -72,7 +68,7 @@ def test_order_of_the_error_in_the_deformation(systems, level, order):
     for quantity in (System.mass_matrix, System.bias, System.accelerations):
         errors = []
         for scale in SCALES:
-            state = with_deformation(full, scale)
+            state = trees.deformed(full, scale)
             a, b = quantity(full, state), quantity(other, state)
             errors.append(np.linalg.norm(a - b) / np.linalg.norm(a))
         assert observed_order(SCALES, errors, floor=1e-15, last=4) == pytest.approx(order, abs=0.1), quantity.__name__
@@ -81,7 +77,7 @@ def test_order_of_the_error_in_the_deformation(systems, level, order):
 def test_a_stiff_flexible_body_moves_like_the_rigid_one(systems):
     """The rigid level is `full` with its modal rows and columns struck out at rest shape."""
     full, rigid = systems["full"], systems["rigid"]
-    state = with_deformation(full, 0.0)
+    state = trees.deformed(full, 0.0)
     modal = np.zeros(full.nu, dtype=bool)
     for body in full.scene.bodies:
         if not isinstance(body, s.RigidBody):
@@ -191,3 +187,37 @@ def test_the_status_tells_exactly_where_the_mass_matrix_is_indefinite():
             with pytest.raises(DynamicsError, match='use level "full"'):
                 linear.accelerations(state)
     assert min(lowest) < 0.0 < max(lowest), "both happen"
+
+
+FIRST = 1.875104068711961**2  # of a clamped-free beam, rad/s for EI = m L^4, the root of cos x cosh x = -1 squared
+SECTION = beam_section(E=1e8, G=4e7, A=1.0, Iy=1e-8, Iz=1e-8, rho=1.0)  # EI = 1 N m^2, 1 kg/m
+PUBLISHED = (6.0, 7.360373)  # spin and flapping frequency over sqrt(EI / (m L^4)): Wright, Smith, Thresher, Wang (1982)
+ROW = re.compile(r"> \| (?:s|flapping frequency[^|]*) \|([\d. |]+)\|")
+
+
+def flapping(level: fm.Level, spins: Real) -> Real:
+    """Lowest frequency (rad/s) across the plane of rotation at these rates (rad/s) of a hub of no radius."""
+    scene = (
+        fm.SceneBuilder("rotor", allow=("level_range",))
+        .beam("blade", length=1.0, elements=16, section=SECTION, level=level, points="line",
+              modes=fm.Modes(count=6, families=("bending_z",)))
+        .revolute("hub", "ground", "blade", axis=(0, 0, 1))
+        .scene()
+    )  # fmt: skip
+    return 2.0 * np.pi * fm.campbell(scene, "hub", spins).frequencies_hz.min(axis=1)
+
+
+def test_the_table_of_the_page():
+    """`stiffened` over `ruthless`, to the digits that are printed; `full` keeps the frequency at rest as well."""
+    text = (ROOT / "docs" / "notation.md").read_text(encoding="utf-8")
+    spins, printed = (np.array(row.split("|"), float) for row in ROW.findall(text))
+    stiffened = flapping("stiffened", FIRST * spins)
+    for level in ("ruthless", "full"):
+        assert stiffened / flapping(level, FIRST * spins) == pytest.approx(printed, abs=0.5001e-3)
+
+
+def test_published_frequency():
+    """Six modes are within 1e-4 of the published frequency."""
+    spin, frequency = PUBLISHED
+    [found] = flapping("stiffened", np.array([spin]))
+    assert found == pytest.approx(frequency, rel=1e-4)

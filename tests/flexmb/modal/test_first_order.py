@@ -13,7 +13,7 @@ from flexmb.modal.first_order import FirstOrder, first_order, inertia_slope
 from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.modal.integrals import modal_integrals
 from tests.bounds import gamma
-from tests.flexmb.modal.test_modal_integrals import random_model
+from tests.flexmb.modal.test_modal_points import random_model
 
 POINTS, MODES = 8, 3
 CIRCLE = 64  # samples: the 65th coefficient is the first to spoil the first, below 1e-30 for |theta| < 5

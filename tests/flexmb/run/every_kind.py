@@ -28,7 +28,7 @@ from flexmb.system.algorithms import RUNNING
 from tests.flexmb.closure.mechanisms import windows
 from tests.flexmb.control import test_closed_chains as closed_loops
 from tests.flexmb.control.scenes import pendulum, rotor
-from tests.flexmb.control.test_attitude import craft
+from tests.flexmb.control.test_satellite import craft
 from tests.flexmb.control.test_taken_up import CONTINUOUS, SAMPLED
 from tests.flexmb.run.test_events import arm, latch
 from tests.flexmb.run.test_events_of_signals import ball, floor

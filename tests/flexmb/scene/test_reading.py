@@ -1,11 +1,15 @@
-"""Text that readers must not take long over."""
+"""Texts that readers must not take long over, and structs made in Python that say by name which key is wrong, as files
+do."""
 
 from __future__ import annotations
 
 import time
 
+import msgspec
 import pytest
 
+import flexmb as fm
+from flexmb.scene import schema
 from flexmb.scene.reading import DEEPEST, MOST_DOTS, Unreadable, parse_toml
 
 
@@ -49,3 +53,23 @@ def test_a_robot_is_told_from_a_scene_with_a_slip() -> None:
     with pytest.raises(Unreadable, match="^XML, and a scene is TOML: ") as error:
         parse_toml('\n<robot name="r"/>')
     assert "flexmb import" in error.value.remedy
+
+
+STRUCTS = [each for name in schema.__all__ if issubclass(type(each := getattr(schema, name)), msgspec.StructMeta)]
+
+
+@pytest.mark.parametrize("struct", STRUCTS, ids=lambda each: each.__name__)
+def test_a_misspelt_key_of_any_struct_is_named_with_the_nearest(struct) -> None:
+    name = msgspec.structs.fields(struct)[-1].name if msgspec.structs.fields(struct) else ""
+    with pytest.raises(TypeError, match=f'^{struct.__name__} has no key "{name}x"') as refused:
+        struct(**{f"{name}x": 1.0})
+    assert not name or f'"{name}"' in str(refused.value)
+    with pytest.raises(TypeError, match=f"^{struct.__name__} "):
+        struct(1.0)
+
+
+def test_what_is_missing_is_named() -> None:
+    with pytest.raises(TypeError, match='^RigidBody has no key "mas": did you mean "mass_kg"'):
+        fm.RigidBody(mas=1.0)
+    with pytest.raises(TypeError, match='^Constant needs the key "value"'):
+        fm.Constant()

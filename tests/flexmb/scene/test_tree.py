@@ -1,8 +1,10 @@
-"""The tree reader: order of bodies, rest frames of nodes, names of coordinates."""
+"""The tree reader: order of bodies, rest frames of nodes, names of coordinates; frames A and B of closures and
+connectors."""
 
 import pytest
 
 from flexmb.scene import schema as s
+from flexmb.scene.ends import EndFrame, ends
 from flexmb.scene.tree import coordinates, node_frame, node_names, ordered, rest_frames
 
 UNIT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -73,3 +75,19 @@ def test_coordinates_carry_their_schema_keys():
         assert [coordinate.name for coordinate in coordinates(kind(**ends))] == expected
     mass = s.PointMass(name="bob", body="a", mass_kg=1.0, directions=((1.0, 0.0, 0.0),))
     assert coordinates(mass) == (("coordinates[0]", s.LinearCoordinate()),)
+
+
+HALF_TURN = (0.0, 0.0, 0.0, 1.0)
+SIDES = {"name": "c", "body_a": "ground", "body_b": "arm", "node_b": "tip", "position_b_m": (0.1, 0.2, 0.3)}
+
+
+def test_ends_of_a_closure_have_their_own_axes() -> None:
+    a, b = ends(s.Closure(type="weld", **SIDES, quaternion_a=HALF_TURN))
+    assert a == EndFrame("ground", "origin", (0.0, 0.0, 0.0), HALF_TURN)
+    assert b == EndFrame("arm", "tip", (0.1, 0.2, 0.3), (1.0, 0.0, 0.0, 0.0))
+
+
+def test_ends_of_a_spring_have_the_axes_of_their_nodes() -> None:
+    a, b = ends(s.SpringDamper(**SIDES, stiffness_N_m=1.0))
+    assert (a.body, b.body, b.node) == ("ground", "arm", "tip")
+    assert a.quaternion == b.quaternion == (1.0, 0.0, 0.0, 0.0)

@@ -1,4 +1,5 @@
-"""Derivatives of loads: of given accelerations, in other axes, across sections."""
+"""Loads across hinges in other axes and about other points, the same wrench; their derivatives, those of given
+accelerations and across sections."""
 
 from __future__ import annotations
 
@@ -8,14 +9,17 @@ import numpy as np
 import pytest
 
 import flexmb as fm
+from flexmb.scene.shapes import beam_section
+from tests.bounds import UNIT_ROUNDOFF
 from tests.flexmb.entry.test_tangent import extrapolated, rounding_of_limit
 from tests.flexmb.system import test_section_loads as sections
 from tests.flexmb.system.test_derivatives import asked, directions
 
-pytestmark = pytest.mark.filterwarnings("ignore:.*is doubtful")
+DOUBTFUL = pytest.mark.filterwarnings("ignore:.*is doubtful")
 
 
 @pytest.mark.parametrize("name", ["every level", "stiffened", "exact", "connectors"])
+@DOUBTFUL
 def test_loads_of_given_accelerations(name: str) -> None:
     """By accelerations they are linear; by the state and time as differences of inverse dynamics say."""
     at = asked(name)
@@ -47,6 +51,7 @@ def test_loads_of_given_accelerations(name: str) -> None:
     [("every level", "outboard", None), ("every level", "inboard", "tip"), ("every level", "world", "origin"),
      ("exact", "inboard", "tip")],
 )  # fmt: skip
+@DOUBTFUL
 def test_loads_in_other_axes_against_differences(name: str, axes: Any, node: str | None) -> None:
     at = asked(name)
     system, state = at.system, at.state
@@ -69,6 +74,7 @@ def test_loads_in_other_axes_against_differences(name: str, axes: Any, node: str
 
 
 @pytest.mark.parametrize(("connected", "level"), [(False, "full"), (True, "full"), (False, "exact")])
+@DOUBTFUL
 def test_section_loads_against_differences(connected: bool, level: fm.Level) -> None:
     modes = {"modes": fm.Modes(count=2)} if level == "exact" else {}
     scene = sections.everything(connected=connected, level=level, **modes)
@@ -96,3 +102,103 @@ def test_section_loads_against_differences(connected: bool, level: fm.Level) -> 
         assert np.max(np.abs(found - expected)) <= allowed
         if np.max(np.abs(expected)) > 1e-3:
             assert np.max(np.abs(found * (1.0 + 1e-5) - expected)) > allowed, "planted"
+
+
+ROUNDING = 2.0**12 * UNIT_ROUNDOFF
+BEAM = beam_section(E=7e10, G=2.7e10, A=2e-4, Iy=2e-9, Iz=3e-9, rho=2700)
+TURN = (np.cos(0.35), 0.0, np.sin(0.35), 0.0)
+
+
+def arm(child_node: str = "origin") -> fm.Scene:
+    """A body on a turned hinge at the tip of a beam that hangs on a turned hinge itself; markers on both frames."""
+    return (
+        fm.SceneBuilder("arm", gravity=(0.3, -9.81, 1.0))
+        .beam("upper", length=1.5, elements=4, section=BEAM, modes=3, nodes={"middle": 0.6})
+        .beam("fore", length=1.0, elements=4, section=BEAM, modes=3)
+        .rigid_body("hand", mass=0.5, inertia=(1e-3, 2e-3, 2e-3), com=(0.1, 0.0, 0.0))
+        .revolute("shoulder", "ground", "upper", axis=(0, 0, 1), angle=0.4, parent_position=(0.2, 0.1, 0.0),
+                  parent_quaternion=TURN, child_quaternion=TURN)
+        .prismatic("elbow", "upper", "fore", parent_node="tip", axis=(0.6, 0.0, 0.8), position=0.1, stiffness=300.0,
+                   child_node=child_node, child_position=(0.05, 0.0, 0.02), child_quaternion=TURN)
+        .universal("wrist", "fore", "hand", parent_node="tip" if child_node == "origin" else "root")
+        .marker("O+", "upper", node="tip")
+        .marker("O", "fore", node=child_node, offset=(0.05, 0.0, 0.02))
+        .marker("middle", "upper", node="middle")
+        .scene()
+    )  # fmt: skip
+
+
+def moving(system: fm.System) -> fm.State:
+    random = np.random.default_rng(5)
+    state = system.initial_state
+    state.q[:] += 0.02 * random.normal(size=system.nq)
+    state.u[:] = random.normal(size=system.nu)
+    return state
+
+
+@pytest.mark.parametrize("child_node", ["origin", "tip"])  # a body at its own frame, and one held where it deforms
+def test_axes_and_points_against_markers(child_node: str) -> None:
+    system = fm.compile(arm(child_node))
+    state = moving(system)
+    seen = system.evaluate(state.t, state.q, state.u).markers
+    turn = fm.scene.quaternions.rotation_matrix(TURN)
+    frames = {"inboard": seen["O+"].rotation, "outboard": seen["O"].rotation @ turn}
+    world = system.hinge_loads(state)["elbow"]
+    for axes, R in frames.items():
+        found = system.hinge_loads(state, axes=axes)["elbow"]
+        np.testing.assert_allclose(found[:3], R.T @ world[:3], atol=ROUNDING * np.linalg.norm(world[:3]))
+        np.testing.assert_allclose(found[3:], R.T @ world[3:], atol=ROUNDING * np.linalg.norm(world[3:]))
+    for about, point in ((("upper", "middle"), seen["middle"].position), (("ground", "origin"), np.zeros(3))):
+        found = system.hinge_loads(state, about=about)["elbow"]
+        torque = world[:3] + np.cross(seen["O"].position - point, world[3:])
+        np.testing.assert_allclose(found[:3], torque, atol=ROUNDING * np.linalg.norm(torque))
+        assert np.array_equal(found[3:], world[3:])
+
+
+def test_a_free_axis_feels_its_spring_alone() -> None:
+    """Along the slide, in the axes of either frame, the load is spring and damper; of forced accelerations too."""
+    system = fm.compile(arm())
+    state = moving(system)
+    spring = -300.0 * state.q[system.coordinate("elbow")][0]
+    udot = system.accelerations(state)
+    for loads in (system.hinge_loads(state, axes="inboard"), system.hinge_loads(state, udot, axes="outboard")):
+        assert loads["elbow"][3:] @ (0.6, 0.0, 0.8) == pytest.approx(spring, rel=1e-9)
+        assert loads["shoulder"][2] == pytest.approx(0.0, abs=1e-9 * np.linalg.norm(loads["shoulder"]))
+
+
+def test_over_a_run() -> None:
+    """The same as state by state."""
+    system = fm.compile(arm("tip"))
+    run = fm.simulate(system, 0.02, samples=4, rtol=1e-6, atol=1e-8)
+    found = run.loads_in("outboard", about=("upper", "middle"))
+    state = system.state(run.q[2], run.u[2], run.t[2])
+    for name, load in system.hinge_loads(state, axes="outboard", about=("upper", "middle")).items():
+        np.testing.assert_allclose(found[name][2], load, atol=1e-10 * np.linalg.norm(load))
+    for name, load in run.loads_in().items():
+        assert np.array_equal(load, run.loads[name])
+
+
+def test_closures_have_frames_too() -> None:
+    """A four-bar that lies in a plane: its pins transmit forces in the plane, whatever their frames' names."""
+    bar = {"mass": 1.0, "com": (0.5, 0.0, 0.0), "inertia": (0.01, 0.1, 0.1)}
+    scene = (
+        fm.SceneBuilder("four-bar", gravity=(0.0, -9.81, 0.0))
+        .rigid_body("crank", **bar).rigid_body("rod", **bar).rigid_body("rocker", **bar)
+        .revolute("a", "ground", "crank", angle=1.2, rate=2.0)
+        .revolute("b", "crank", "rod", parent_position=(1, 0, 0), angle=-1.2)
+        .revolute("d", "ground", "rocker", parent_position=(1, 0, 0), angle=1.2)
+        .closure("c", "revolute", "rod", "rocker", position_a=(1, 0, 0), position_b=(1, 0, 0))
+        .marker("B", "rocker", offset=(1, 0, 0))
+        .scene()
+    )  # fmt: skip
+    system = fm.compile(scene)
+    state = system.initial_state
+    world, inner = system.hinge_loads(state)["c"], system.hinge_loads(state, axes="outboard")["c"]
+    rotation = system.evaluate(0.0, state.q, state.u).markers["B"].rotation
+    force, size = world[3:5], np.linalg.norm(world[3:5])  # in the plane; what closes it in space is left open
+    np.testing.assert_allclose(rotation[:2, :2] @ inner[3:5], force, atol=1e-12 * size)
+    about = system.hinge_loads(state, about=("rocker", "origin"))["c"]
+    [x, y, _] = rotation @ (1.0, 0.0, 0.0)
+    np.testing.assert_allclose(about[2], world[2] + x * force[1] - y * force[0], atol=1e-12 * size)
+    for load in (world, inner, about):
+        assert np.isnan(load).tolist() == [True, True, False, False, False, True]

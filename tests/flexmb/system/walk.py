@@ -55,7 +55,7 @@ INNER = {  # classes of the mechanics and of runs, which users meet only behind 
     "Equations", "ClosedEquations", "Pushforward",  # of what derivatives are taken of
     "RunMethod",  # of the advisor's
     "FinalValue",  # data
-    "Restart",  # its files: tests/flexmb/run/test_damaged_restarts.py
+    "Restart",  # its files: tests/flexmb/run/test_restart.py
 }  # fmt: skip
 DEEP = 4  # attributes in a row
 GUARDED = {  # who holds arrays that kernels write, and why no two threads write them at once

@@ -1,4 +1,5 @@
-"""States that are half right: made, replaced, copied or altered so that they do not fit their system."""
+"""States that are half right: made, replaced, copied or altered so that they do not fit their system. Names that a
+result does not have, refused by its place, and statuses, which print theirs."""
 
 from __future__ import annotations
 
@@ -10,7 +11,9 @@ import numpy as np
 import pytest
 
 import flexmb as fm
+from flexmb.run.warm_up import pendulum
 from flexmb.tables import arguments
+from tests.flexmb.system.argument_kinds import W
 
 
 @pytest.fixture(scope="module")
@@ -90,3 +93,46 @@ def test_a_mask_that_hides_nothing_is_no_harm():
     endless.append(endless)
     with pytest.raises((TypeError, ValueError)):
         arguments.array("q", endless)
+
+
+def _results() -> list[tuple[object, str]]:
+    run, tree, state = W.run, W.tree, W.state
+    found = tree.evaluate(state.t, state.q, state.u), tree.evaluation_derivatives(state)
+    kept = run, pickle.loads(pickle.dumps(run)), copy.deepcopy(run), run.then(run)
+    return [(each, "elbow") for each in (*found, *kept)]
+
+
+def test_a_name_that_is_not_there_is_refused_with_the_remedy():
+    for result, hinge in _results():
+        assert hinge in result.loads and isinstance(result.loads, dict)
+        with pytest.raises(KeyError, match=r"loads\[.elbw.\].*did you mean \"elbow\""):
+            result.loads["elbw"]
+        with pytest.raises(KeyError, match=r"markers\[.nobody.\].*use one of: centre"):
+            result.markers["nobody"]
+        with pytest.raises(KeyError, match=r"energy\[5\].*use one of: gravity, kinetic"):
+            result.energy[5]
+        assert result.loads.get("nobody") is None and "nobody" not in result.loads
+
+
+def test_an_argument_of_the_builder_that_does_not_exist_is_refused_with_the_remedy():
+    builder = fm.SceneBuilder("s")
+    with pytest.raises(TypeError, match=r"rigid_body\(\) has no argument \"mas\": did you mean \"mass\""):
+        builder.rigid_body("a", mas=2.0, inertia=(1.0, 1.0, 1.0))
+    with pytest.raises(TypeError, match="agle.*angle"):
+        builder.revolute("h", "ground", "a", agle=0.5)
+
+
+def test_a_status_prints_its_name() -> None:
+    assert str(fm.Status.MAX_STEPS) == f"{fm.Status.MAX_STEPS}" == "MAX_STEPS"
+    assert f"{fm.Status.MAX_STEPS:>10}" == " MAX_STEPS"
+    assert f"{fm.Status.MAX_STEPS:02d}" == "04"
+    assert fm.Status.MAX_STEPS == 4 and int(fm.Status.MAX_STEPS) == 4
+    assert np.array([fm.Status.MAX_STEPS]).dtype.kind == "i"
+
+
+def test_of_single_states_and_of_many() -> None:
+    system = fm.compile(pendulum())
+    state = system.initial_state
+    assert str(system.precision(state).status) == "OK"
+    assert system.accelerations_batch(state.q[None], state.u[None]).statuses == (fm.Status.OK,)
+    assert fm.simulate_batch(system, 0.1, q=state.q[None], u=state.u[None]).statuses == (fm.Status.OK,)
