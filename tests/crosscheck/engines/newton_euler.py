@@ -9,25 +9,12 @@ import numpy as np
 from msgspec.structs import replace
 
 from crosscheck.engines.contract import MarkerSnapshot, Snapshot
+from flexmb.scene import schema as s
 from flexmb.scene.collecting import make
 from flexmb.scene.functions import Constant
-from flexmb.scene.schema import (
-    Cylindrical,
-    Free,
-    Gimbal,
-    Marker,
-    Node,
-    Planar,
-    Prismatic,
-    Revolute,
-    Scene,
-    Spherical,
-    Universal,
-    Weld,
-)  # fmt: skip
 
 
-def with_markers(scene: Scene) -> Scene:
+def with_markers(scene: s.Scene) -> s.Scene:
     """The scene with markers at body frames and mass centres, and at both frames of hinges as turned nodes.
 
     Scenes for this check attach hinges by the nodes "origin" with frames offset by position and quaternion.
@@ -37,21 +24,21 @@ def with_markers(scene: Scene) -> Scene:
     for hinge in scene.hinges:
         child = bodies[hinge.child]
         placed = make(
-            Node, name=f"{hinge.name} out", position=hinge.child_position_m, quaternion=hinge.child_quaternion
+            s.Node, name=f"{hinge.name} out", position=hinge.child_position_m, quaternion=hinge.child_quaternion
         )
         bodies[child.name] = replace(child, nodes=(*child.nodes, placed))
-        markers.append(Marker(name=placed.name, body=child.name, node=placed.name))
+        markers.append(s.Marker(name=placed.name, body=child.name, node=placed.name))
         if hinge.parent != "ground":
             parent = bodies[hinge.parent]
             placed = make(
-                Node, name=f"{hinge.name} in", position=hinge.parent_position_m, quaternion=hinge.parent_quaternion
+                s.Node, name=f"{hinge.name} in", position=hinge.parent_position_m, quaternion=hinge.parent_quaternion
             )
             bodies[parent.name] = replace(parent, nodes=(*parent.nodes, placed))
-            markers.append(Marker(name=placed.name, body=parent.name, node=placed.name))
+            markers.append(s.Marker(name=placed.name, body=parent.name, node=placed.name))
     for body in scene.bodies:
         markers += [
-            Marker(name=body.name, body=body.name),
-            Marker(name=f"{body.name} com", body=body.name, offset_m=body.com_m),
+            s.Marker(name=body.name, body=body.name),
+            s.Marker(name=f"{body.name} com", body=body.name, offset_m=body.com_m),
         ]
     return replace(scene, bodies=tuple(bodies[body.name] for body in scene.bodies), markers=tuple(markers))
 
@@ -67,7 +54,7 @@ def rotation(quaternion) -> np.ndarray:
     )
 
 
-def body_residual(scene: Scene, snapshot: Snapshot, name: str) -> np.ndarray:
+def body_residual(scene: s.Scene, snapshot: Snapshot, name: str) -> np.ndarray:
     """[torque; force] (6,) about the mass centre that Newton and Euler miss: zero for a right snapshot."""
     body = next(body for body in scene.bodies if body.name == name)
     frame, com = snapshot.markers[name], snapshot.markers[f"{name} com"]
@@ -85,45 +72,45 @@ def body_residual(scene: Scene, snapshot: Snapshot, name: str) -> np.ndarray:
     return rate
 
 
-def inboard(scene: Scene, snapshot: Snapshot, hinge) -> MarkerSnapshot:
+def inboard(scene: s.Scene, snapshot: Snapshot, hinge) -> MarkerSnapshot:
     if hinge.parent != "ground":
         return snapshot.markers[f"{hinge.name} in"]
     still = np.zeros(6)
     return MarkerSnapshot(np.array(hinge.parent_position_m), np.array(hinge.parent_quaternion), still, still)
 
 
-def hinge_forces(scene: Scene, snapshot: Snapshot, hinge) -> tuple[np.ndarray, np.ndarray]:
+def hinge_forces(scene: s.Scene, snapshot: Snapshot, hinge) -> tuple[np.ndarray, np.ndarray]:
     """Generalised forces that the load across the hinge has along its freedoms, and those its springs, dampers and
     motors should give (constant motors only)."""
     P, C = inboard(scene, snapshot, hinge), snapshot.markers[f"{hinge.name} out"]
     R_P, R_C = rotation(P.quaternion), rotation(C.quaternion)
     tau, f = snapshot.loads[hinge.name][:3], snapshot.loads[hinge.name][3:]
     match hinge:
-        case Weld():
+        case s.Weld():
             return np.zeros(0), np.zeros(0)
-        case Revolute():
+        case s.Revolute():
             pairs = [(R_P @ hinge.axis @ tau, hinge.rotation)]
-        case Prismatic():
+        case s.Prismatic():
             pairs = [(R_P @ hinge.axis @ f, hinge.translation)]
-        case Cylindrical():
+        case s.Cylindrical():
             pairs = [(R_P @ hinge.axis @ tau, hinge.rotation), (R_P @ hinge.axis @ f, hinge.translation)]
-        case Universal():
+        case s.Universal():
             pairs = [(R_P[:, 0] @ tau, hinge.first), (R_C[:, 1] @ tau, hinge.second)]
-        case Planar():
+        case s.Planar():
             pairs = [(R_P[:, 0] @ f, hinge.x), (R_P[:, 1] @ f, hinge.y), (R_P[:, 2] @ tau, hinge.rotation)]
-        case Gimbal(sequence="zx"):
+        case s.Gimbal(sequence="zx"):
             pairs = [(R_P[:, 2] @ tau, hinge.rotations[0]), (R_C[:, 0] @ tau, hinge.rotations[1])]
-        case Gimbal(sequence="zyx"):
+        case s.Gimbal(sequence="zyx"):
             angle = hinge.rotations[0].angle_rad
             carried_y = R_P @ [-np.sin(angle), np.cos(angle), 0.0]
             axes = (R_P[:, 2], carried_y, R_C[:, 0])
             pairs = [(axis @ tau, turn) for axis, turn in zip(axes, hinge.rotations, strict=True)]
-        case Spherical():
+        case s.Spherical():
             w = R_C.T @ (C.velocity[:3] - P.velocity[:3])
             q = np.array(hinge.quaternion) * (1.0 if hinge.quaternion[0] >= 0.0 else -1.0)
             turn = 2.0 * np.arccos(q[0]) * q[1:] / np.linalg.norm(q[1:])
             return R_C.T @ tau, -hinge.stiffness_Nm_rad * turn - hinge.damping_Nms_rad * w
-        case Free():
+        case s.Free():
             return snapshot.loads[hinge.name], np.zeros(6)
     return np.array([load for load, _ in pairs]), np.array([_passive(each) for _, each in pairs])
 

@@ -6,20 +6,8 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.random import Generator
 
+from flexmb.scene import schema as s
 from flexmb.scene.modal_data import modal_arrays
-from flexmb.scene.schema import (
-    BeamBody,
-    Free,
-    Hinge,
-    ModalBody,
-    ModalState,
-    PointMass,
-    Quaternion,
-    Scene,
-    Spherical,
-    Vector,
-    Wheel,
-)  # fmt: skip
 from flexmb.scene.strains import families
 from flexmb.scene.tree import Coordinate, coordinates, with_coordinates
 
@@ -30,9 +18,9 @@ _WHEEL_SPEED = 20.0  # rad/s
 _DEFLECTION = 0.03  # of a beam's length
 
 
-def randomise(scene: Scene, rng: Generator) -> Scene:
+def randomise(scene: s.Scene, rng: Generator) -> s.Scene:
     """The scene with random hinge coordinates and speeds, modal states and wheel speeds, except prescribed ones."""
-    flexible = [body for body in scene.bodies if isinstance(body, BeamBody | ModalBody) and body.level != "rigid"]
+    flexible = [body for body in scene.bodies if isinstance(body, s.BeamBody | s.ModalBody) and body.level != "rigid"]
     states = tuple(_modal_state(body, rng) for body in flexible)
     return replace(
         scene, hinges=tuple(_hinge(hinge, rng) for hinge in scene.hinges),
@@ -41,12 +29,12 @@ def randomise(scene: Scene, rng: Generator) -> Scene:
     )  # fmt: skip
 
 
-def _hinge(hinge: Hinge, rng: Generator) -> Hinge:
-    if isinstance(hinge, Free):
+def _hinge(hinge: s.Hinge, rng: Generator) -> s.Hinge:
+    if isinstance(hinge, s.Free):
         hinge = replace(hinge, position_m=_vector(rng, _SHIFT))
-    if isinstance(hinge, Free | Spherical):
+    if isinstance(hinge, s.Free | s.Spherical):
         hinge = replace(hinge, quaternion=_quaternion(rng), angular_velocity_rad_s=_vector(rng, _RATE))
-    if isinstance(hinge, Free):
+    if isinstance(hinge, s.Free):
         hinge = replace(hinge, velocity_m_s=_vector(rng, _RATE))
     return with_coordinates(hinge, [_coordinate(each, rng) for _, each in coordinates(hinge)])
 
@@ -59,22 +47,22 @@ def _coordinate(coordinate: Coordinate, rng: Generator) -> Coordinate:
     return replace(coordinate, **{keys.value: size * value, keys.rate: rate})
 
 
-def _point_mass(point: PointMass, rng: Generator) -> PointMass:
+def _point_mass(point: s.PointMass, rng: Generator) -> s.PointMass:
     return with_coordinates(point, [_coordinate(each, rng) for _, each in coordinates(point)])
 
 
-def _wheel(wheel: Wheel, rng: Generator) -> Wheel:
+def _wheel(wheel: s.Wheel, rng: Generator) -> s.Wheel:
     if wheel.prescribed_rad is not None:
         return wheel
     return replace(wheel, angle_rad=rng.uniform(-np.pi, np.pi), speed_rad_s=rng.uniform(-_WHEEL_SPEED, _WHEEL_SPEED))
 
 
-def _modal_state(body: BeamBody | ModalBody, rng: Generator) -> ModalState:
+def _modal_state(body: s.BeamBody | s.ModalBody, rng: Generator) -> s.ModalState:
     """Modal coordinates whose largest displacement is a few per cent of the body's size, rates alike per second."""
     match body:
-        case BeamBody():
+        case s.BeamBody():
             count, scale = _beam_modes(body)
-        case ModalBody():
+        case s.ModalBody():
             arrays = modal_arrays(body)
             modes = arrays.translation_modes
             count = modes.shape[2]
@@ -83,10 +71,10 @@ def _modal_state(body: BeamBody | ModalBody, rng: Generator) -> ModalState:
         case _:
             assert_never(body)
     coordinates, rates = scale * rng.uniform(-1.0, 1.0, (2, count))
-    return ModalState(body=body.name, coordinates=tuple(map(float, coordinates)), rates=tuple(map(float, rates)))
+    return s.ModalState(body=body.name, coordinates=tuple(map(float, coordinates)), rates=tuple(map(float, rates)))
 
 
-def _beam_modes(body: BeamBody) -> tuple[int, float]:
+def _beam_modes(body: s.BeamBody) -> tuple[int, float]:
     """Number of modes, and a coordinate that moves the tip by a few per cent: beam modes have unit modal mass.
 
     Attachment modes add, for each wanted family, one (axial, torsion) or two (bending: force and moment). Torsional
@@ -105,12 +93,12 @@ def _beam_modes(body: BeamBody) -> tuple[int, float]:
     return body.modes.count + extra, float(scale)
 
 
-def _quaternion(rng: Generator) -> Quaternion:
+def _quaternion(rng: Generator) -> s.Quaternion:
     q = rng.normal(size=4)
     w, x, y, z = (float(part) for part in q / np.linalg.norm(q))
     return (w, x, y, z)
 
 
-def _vector(rng: Generator, size: float) -> Vector:
+def _vector(rng: Generator, size: float) -> s.Vector:
     x, y, z = (float(part) for part in rng.uniform(-size, size, 3))
     return (x, y, z)

@@ -19,6 +19,7 @@ from crosscheck.running import starts
 from flexmb.scene.build import angular, linear
 from flexmb.scene.hinges import WITH_AXIS, ClosureKind
 from flexmb.scene.schema import Closure, Scene
+from tests.crosscheck.engines.peers import off
 
 KINDS = get_args(ClosureKind)
 Z = (0.0, 0.0, 1.0)
@@ -57,13 +58,6 @@ def loop(kind: ClosureKind) -> Scene:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", fm.SceneWarning)  # its speeds need to fit only roughly
         return starts.closed(msgspec.structs.replace(scene, closures=(closure,)))
-
-
-def off(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> float:
-    """Largest difference of named arrays, relative to the largest number of all."""
-    assert one.keys() == other.keys()
-    size = max(float(np.max(np.abs(each))) for each in one.values())
-    return max(float(np.max(np.abs(one[name] - other[name]))) for name in one) / size
 
 
 CLOSED = [(name, kind) for name in ("pinocchio", "exudyn") for kind in KINDS]

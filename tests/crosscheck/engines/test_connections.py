@@ -17,6 +17,7 @@ from flexmb.scene.functions import Constant
 from flexmb.scene.schema import Load, Scene
 from flexmb.scene.shapes import beam_section
 from flexmb.surrogate import modal_points
+from tests.crosscheck.engines.peers import off
 
 CASES = Path(__file__).parents[3] / "cases"
 CASE, ANDREWS = (CASES / case / "scene.toml" for case in ("connectors/sprung_platform", "closed_chains/andrews"))
@@ -28,13 +29,6 @@ LIBRARY = {"native-composite": "flexmb", "drake": "pydrake"}
 
 def only(scene: Scene, *kinds: type[Connector]) -> Scene:
     return msgspec.structs.replace(scene, connectors=tuple(x for x in scene.connectors if isinstance(x, kinds)))
-
-
-def off(ours: dict, theirs: dict) -> float:
-    """Largest difference of named arrays, relative to the largest number of all."""
-    assert ours.keys() == theirs.keys()
-    size = max((float(np.max(np.abs(each))) for each in ours.values()), default=1.0)
-    return max((float(np.max(np.abs(ours[name] - theirs[name]))) for name in ours), default=0.0) / size
 
 
 @pytest.mark.parametrize("name", WITHIN)

@@ -9,33 +9,16 @@ import pytest
 from crosscheck.conformance.catalogue import CLAUSES
 from crosscheck.conformance.clause import POINTWISE
 from crosscheck.conformance.trial import try_clause
-from crosscheck.engines.contract import Engine, EngineMissing, Run, Snapshot
+from crosscheck.engines.contract import Engine, Run
 from crosscheck.engines.registry import engines
 from tests.crosscheck.engines.newton_euler import body_residual, hinge_forces, with_markers
+from tests.crosscheck.engines.peers import installed, taking
 from tests.crosscheck.engines.random_scenes import KINDS, random_scene
 
-ENGINES = engines()
 
-
-@pytest.fixture(params=list(ENGINES))
+@pytest.fixture(params=list(engines()))
 def engine(request) -> Engine:
-    found = ENGINES[request.param]
-    try:
-        found.version()
-    except EngineMissing as missing:
-        pytest.skip(str(missing))
-    return found
-
-
-def compiled(engine: Engine, scene):
-    support = engine.supports(scene)
-    if support.kind != "exact":
-        pytest.skip(f"{engine.name}: {support.reason}")
-    return engine.compile(scene)
-
-
-def evaluate(engine: Engine, scene) -> Snapshot:
-    return compiled(engine, scene).evaluate()
+    return installed(request.param)
 
 
 def near(value, scale: float = 1.0):
@@ -57,7 +40,7 @@ def test_every_hinge_kind_obeys_newton_and_euler(engine, kind):
     rng = np.random.default_rng(KINDS.index(kind))
     kinds = ("free" if kind == "weld" else kind, "revolute", kind)
     scene = with_markers(random_scene(rng, kinds, extras=False, nodes=False))
-    snapshot = evaluate(engine, scene)
+    snapshot = taking(engine.name, scene).compile(scene).evaluate()
     scale = max(np.abs(load).max() for load in snapshot.loads.values())
     for body in scene.bodies:
         assert body_residual(scene, snapshot, body.name) == near(np.zeros(6), scale), body.name
@@ -71,7 +54,7 @@ def test_velocity_is_the_rate_of_position(engine, kind):
     """Positions of short runs forth and the initial velocity: x(h) = x + h v + h^2/2 a + O(h^3)."""
     rng = np.random.default_rng(50 + KINDS.index(kind))
     scene = random_scene(rng, (kind, "revolute"), extras=False)
-    model = compiled(engine, scene)
+    model = taking(engine.name, scene).compile(scene)
     start = model.evaluate()
     h = 1e-3
     run = model.simulate(Run(np.array([0.0, h])), engine.efforts(scene)[-1])
@@ -85,7 +68,7 @@ def test_velocity_is_the_rate_of_position(engine, kind):
 
 def test_work_balances_energy_where_an_engine_integrates_it(engine):
     scene = random_scene(np.random.default_rng(3), ("free", "revolute", "spherical"), driven=True)
-    model = compiled(engine, scene)
+    model = taking(engine.name, scene).compile(scene)
     run = Run(np.linspace(0.0, 1.0, 6))
     balances = []
     for effort in engine.efforts(scene)[-2:]:

@@ -10,6 +10,7 @@ from crosscheck.engines.contract import Effort, Run
 from crosscheck.engines.registry import BUILT_IN, engine
 from flexmb.scene.build import angular
 from flexmb.scene.schema import Scene
+from tests.crosscheck.engines.peers import off
 from tests.trees import with_armatures
 
 
@@ -35,13 +36,6 @@ def machine(driven: bool = True) -> Scene:
     scene.coupling("rack", "rail", {("shoulder", "first"): 0.1})
     scene.coupling("cross", "shoulder", {"turn": 1.5, "rail": -15.0}, coordinate="second", offset=0.5)
     return scene.marker("tip", "hand", offset=(0.3, 0.0, 0.1)).scene()
-
-
-def off(ours: dict, theirs: dict) -> float:
-    """Largest difference of named arrays, relative to the largest number of all."""
-    assert ours.keys() == theirs.keys()
-    size = max(float(np.max(np.abs(each))) for each in ours.values())
-    return max(float(np.max(np.abs(ours[name] - theirs[name]))) for name in ours) / size
 
 
 @pytest.mark.parametrize(("name", "armed"), [("pinocchio", True), ("pinocchio", False), ("opensim", False)])

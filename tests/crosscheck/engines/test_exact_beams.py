@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from crosscheck.engines.contract import EngineMissing, Run
+from crosscheck.engines.contract import Run
 from crosscheck.engines.registry import BUILT_IN, OWN_CODE, engine
 from crosscheck.library.case import Refined, Variant
 from crosscheck.running.plan import variant_scene
@@ -13,6 +13,7 @@ from flexmb.scene.build import SceneBuilder
 from flexmb.scene.check import check_scene
 from flexmb.scene.functions import Constant
 from flexmb.scene.strains import polynomials
+from tests.crosscheck.engines.peers import installed
 
 LENGTH, WEIGHT = 1.0, 0.5  # m, kg/m
 
@@ -36,19 +37,14 @@ def strip(gravity: float = 0.0, curvature: float = 0.0, **modes: object) -> s.Sc
 
 @pytest.mark.parametrize("name", [name for name in BUILT_IN if name not in (*OWN_CODE, "exudyn-beam")])
 def test_engines_of_rigid_bodies_and_of_modes_refuse_it_with_the_remedy(name: str) -> None:
-    try:
-        engine(name).version()
-    except EngineMissing:
-        pytest.skip(f"{name} is not installed")
-    support = engine(name).supports(strip())
+    support = installed(name).supports(strip())
     assert support.kind == "no"
     assert '"strip"' in support.reason
     assert "exudyn-beam" in support.reason or "finite-segment" in support.reason
 
 
 @pytest.mark.parametrize(
-    ("scene", "what"),
-    [(strip(viscosity_s=1e-3), "rate of strain"), (strip(damping_ratio=0.01), "modal damping")],
+    ("scene", "what"), [(strip(viscosity_s=1e-3), "rate of strain"), (strip(damping_ratio=0.01), "modal damping")]
 )
 def test_exudyns_beams_refuse_what_they_have_not(scene: s.Scene, what: str) -> None:
     check_scene(scene)

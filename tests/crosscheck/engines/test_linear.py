@@ -26,6 +26,7 @@ from flexmb.scene.functions import Constant
 from flexmb.scene.schema import Scene
 from flexmb.system.compile import compile
 from flexmb.typing import Real
+from tests.crosscheck.engines.peers import installed
 from tests.crosscheck.engines.random_scenes import KINDS, random_scene
 from tests.repo.project import ROOT
 from tests.trees import with_armatures
@@ -49,11 +50,7 @@ def tree(seed: int, driven: bool, armed: bool = False) -> Scene:
 
 
 def asked(name: str, scene: Scene) -> Trajectory:
-    tried = CheckedEngine(engine(name), duration_s=TIMES[-1])
-    try:
-        tried.version()
-    except EngineMissing as missing:
-        pytest.skip(str(missing))
+    tried = CheckedEngine(installed(name), duration_s=TIMES[-1])
     support = tried.supports(scene)
     if support.kind != "exact":
         pytest.skip(support.reason)
@@ -78,14 +75,9 @@ def agree(name: str, scene: Scene) -> None:
 
 @pytest.mark.parametrize("name", OTHERS)
 @pytest.mark.parametrize("seed", SEEDS)
-def test_engines_agree_on_random_trees(name: str, seed: int) -> None:
-    agree(name, tree(seed, driven=False))
-
-
-@pytest.mark.parametrize("name", OTHERS)
-@pytest.mark.parametrize("seed", SEEDS)
-def test_engines_agree_beside_prescribed_coordinates(name: str, seed: int) -> None:
-    agree(name, tree(seed, driven=True))
+@pytest.mark.parametrize("driven", [False, True], ids=["free", "driven"])
+def test_engines_agree_on_random_trees(name: str, seed: int, driven: bool) -> None:
+    agree(name, tree(seed, driven))
 
 
 @pytest.mark.parametrize("name", ["pinocchio", "mujoco", "drake"])

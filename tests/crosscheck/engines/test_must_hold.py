@@ -12,11 +12,12 @@ import pytest
 from msgspec.structs import replace
 
 import flexmb
-from crosscheck.engines.contract import Effort, Engine, EngineMissing, MarkerSnapshot, Run, Snapshot
+from crosscheck.engines.contract import Effort, MarkerSnapshot, Run, Snapshot
 from crosscheck.engines.registry import engine
 from flexmb.scene import schema as s
 from flexmb.surrogate import finite_segments, modal_points, rigidify
 from tests import trees
+from tests.crosscheck.engines.peers import taking
 from tests.crosscheck.engines.randomise import randomise
 
 # Trees: a random state of a closed chain leaves its closures open. Those are held at a state that closes them, in
@@ -45,19 +46,6 @@ FLIGHT = 1e-7
 def shipped(path: Path) -> s.Scene:
     """The scene of a case without its controllers: at a state by itself their signals are zero, and peers have none."""
     return flexmb.open_loop(flexmb.load_scene(path))
-
-
-def peer(name: str, scene: s.Scene) -> Engine:
-    """The engine, or a skip that says why it cannot judge this scene."""
-    found = engine(name)
-    try:
-        found.version()
-    except EngineMissing as missing:
-        pytest.skip(str(missing))
-    support = found.supports(scene)
-    if support.kind != "exact":
-        pytest.skip(f"{name}: {support.reason}")
-    return found
 
 
 def largest(motions: list[np.ndarray]) -> float:
@@ -92,7 +80,7 @@ def compare_loads(scene: s.Scene, ours: Snapshot, theirs: Snapshot, tolerance: f
 
 def compare_rigid(scene: s.Scene, name: str) -> None:
     ours = engine("native").compile(scene).evaluate()
-    theirs = peer(name, scene).compile(scene).evaluate()
+    theirs = taking(name, scene).compile(scene).evaluate()
     compare_accelerations(ours.markers, theirs.markers, ACCELERATION)
     compare_loads(scene, ours, theirs, LOAD)
 
@@ -158,7 +146,7 @@ def flying_beam(boundary: str) -> s.Scene:
 def test_full_has_the_mass_matrix_of_exudyns_floating_frame(boundary, seed):
     """[modes; angular; linear] in body axes: a free hinge's own speeds, where it sits at the body frame."""
     scene = randomise(modal_points(flying_beam(boundary)), np.random.default_rng(seed))
-    theirs = peer("exudyn", scene).compile(scene).mass_matrix("beam")
+    theirs = taking("exudyn", scene).compile(scene).mass_matrix("beam")
     system = flexmb.compile(scene)
     free, modes = system.speed("free"), system.speed("beam.modes")
     order = np.r_[modes, free]
@@ -171,7 +159,7 @@ def test_full_has_the_mass_matrix_of_exudyns_floating_frame(boundary, seed):
                          ids=["hinged", "flying, clamped modes", "flying, free modes"])  # fmt: skip
 def test_full_has_the_accelerations_of_exudyns_floating_frame(build, seed):
     scene = randomise(modal_points(build()), np.random.default_rng(seed))
-    theirs = peer("exudyn", scene).compile(scene).evaluate()
+    theirs = taking("exudyn", scene).compile(scene).evaluate()
     ours = engine("native").compile(scene).evaluate()
     compare_accelerations(ours.markers, theirs.markers, FLEXIBLE)
 
@@ -184,7 +172,7 @@ def test_flexible_cases_at_random_states(path):
     if any(body.level == "exact" for body in scene.bodies):
         pytest.skip("no code but this has beams of strain modes")
     scene = randomise(modal_points(scene), np.random.default_rng(1))
-    theirs = peer("exudyn", scene).compile(scene).evaluate()
+    theirs = taking("exudyn", scene).compile(scene).evaluate()
     compare_accelerations(engine("native").compile(scene).evaluate().markers, theirs.markers, FLEXIBLE)
 
 
@@ -198,7 +186,7 @@ def test_ten_seconds_of_free_flight(boundary):
         state, coordinates=tuple(0.1 * x for x in state.coordinates), rates=tuple(0.1 * x for x in state.rates or ())
     )
     scene, run = replace(scene, modal_states=(gentle,)), Run(np.linspace(0.0, 10.0, 101))
-    theirs = peer("exudyn", scene).compile(scene).simulate(run, Effort("tolerance", 1e-11, "DOPRI5"))
+    theirs = taking("exudyn", scene).compile(scene).simulate(run, Effort("tolerance", 1e-11, "DOPRI5"))
     ours = engine("native").compile(scene).simulate(run, Effort("tolerance", 1e-12, "dop853"))
     assert ours.status == theirs.status == "finished"
     for name, path in ours.markers.items():

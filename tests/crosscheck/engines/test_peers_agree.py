@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-from crosscheck.engines.contract import EngineMissing, Snapshot
+from crosscheck.engines.contract import Snapshot
 from crosscheck.engines.links import first_armature
 from crosscheck.engines.registry import engines
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.functions import Constant
 from flexmb.scene.schema import Scene
+from tests.crosscheck.engines.peers import taking
 from tests.crosscheck.engines.random_scenes import KINDS, LATER_KINDS, random_scene
 from tests.trees import with_armatures
 
@@ -22,16 +23,8 @@ REDUNDANT = {"exudyn": 100.0}
 NO_ARMATURES = ("basilisk", "dart", "exudyn", "opensim")
 
 
-def _snapshot(name: str, scene) -> Snapshot:
-    engine = ENGINES[name]
-    try:
-        engine.version()
-    except EngineMissing as missing:
-        pytest.skip(str(missing))
-    support = engine.supports(scene)
-    if support.kind != "exact":
-        pytest.skip(support.reason)
-    return engine.compile(scene).evaluate()
+def _snapshot(name: str, scene: Scene) -> Snapshot:
+    return taking(name, scene).compile(scene).evaluate()
 
 
 def _equal_motion(ours: Snapshot, theirs: Snapshot, bound: float) -> None:
@@ -62,21 +55,19 @@ def _compare(scene, name: str) -> None:
         assert np.abs(ours.momentum - theirs.momentum).max() <= 1e-12 * np.abs(ours.momentum).max()
 
 
-@pytest.mark.parametrize("name", [name for name in ENGINES if name != "pinocchio"])
+PEERS = [name for name in ENGINES if name != "pinocchio"]
+
+
+@pytest.mark.parametrize("name", PEERS)
 @pytest.mark.parametrize("seed", range(6))
-def test_random_tree(name, seed):
-    rng = np.random.default_rng(seed)
-    _compare(random_scene(rng, ("free", *rng.choice(KINDS, 8))), name)
+@pytest.mark.parametrize("driven", [False, True], ids=["free", "driven"])
+def test_random_tree(name, seed, driven):
+    rng = np.random.default_rng(100 * driven + seed)
+    kinds = ("revolute", *rng.choice(KINDS[:-1], 7)) if driven else ("free", *rng.choice(KINDS, 8))
+    _compare(random_scene(rng, kinds, driven=driven), name)
 
 
-@pytest.mark.parametrize("name", [name for name in ENGINES if name != "pinocchio"])
-@pytest.mark.parametrize("seed", range(6))
-def test_random_tree_with_prescribed_coordinates(name, seed):
-    rng = np.random.default_rng(100 + seed)
-    _compare(random_scene(rng, ("revolute", *rng.choice(KINDS[:-1], 7)), driven=True), name)
-
-
-@pytest.mark.parametrize("name", [name for name in ENGINES if name != "pinocchio"])
+@pytest.mark.parametrize("name", PEERS)
 @pytest.mark.parametrize("driven", [False, True], ids=["free", "driven"])
 def test_random_tree_with_armatures(name, driven):
     """Pinocchio, MuJoCo and Drake have armatures; the others refuse the first one by its name."""
@@ -91,7 +82,7 @@ def test_random_tree_with_armatures(name, driven):
         _notices_armatures(scene, armed, name)
 
 
-@pytest.mark.parametrize("name", [name for name in ENGINES if name != "pinocchio"])
+@pytest.mark.parametrize("name", PEERS)
 def test_frames_without_mass_that_are_welded_to_others(name):
     """What every robot's file has: a base, a flange that carries the next link, a tool. MuJoCo refused them."""
     none = (0.0, 0.0, 0.0)
@@ -115,7 +106,7 @@ def _notices_armatures(scene: Scene, armed: Scene, name: str) -> None:
 
 @pytest.mark.parametrize("name", [
     pytest.param(name, marks=pytest.mark.slow if name.startswith("native-") else ())  # each compiles for half a minute
-    for name in ENGINES if name != "pinocchio"
+    for name in PEERS
 ])  # fmt: skip
 def test_random_tree_with_kinds_that_came_later(name):
     """... one by itself, one that is prescribed and one behind others."""

@@ -4,28 +4,20 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from crosscheck.engines.contract import Effort, Engine, EngineMissing, Run
+from crosscheck.engines.contract import Effort, Run
 from crosscheck.engines.opensim.engine import MASSLESS
 from crosscheck.engines.registry import engines
 from crosscheck.engines.trajectories import continuous
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.functions import Constant, Function, Pulse, Sine, SpinUp
 from flexmb.scene.schema import BeamStation, Scene
+from tests.crosscheck.engines.peers import installed
 from tests.crosscheck.engines.random_scenes import random_scene
 
 RIGID = ("pinocchio", "mujoco")
 PEERS = (*RIGID, "drake", "dart", "opensim")
 OF_SCIPY = ("dart", "opensim")  # whose efforts are SciPy's tolerances, and whose prescribed motion is its function's
 KINDS = ("free", "revolute", "spherical", "prismatic", "universal")
-
-
-def peer(name: str) -> Engine:
-    engine = engines()[name]
-    try:
-        engine.version()
-    except EngineMissing as missing:
-        pytest.skip(str(missing))
-    return engine
 
 
 def pushed(function: Function) -> Scene:
@@ -42,7 +34,7 @@ def pushed(function: Function) -> Scene:
 @pytest.mark.parametrize("name", PEERS)
 def test_a_pulse_between_samples_costs_no_accuracy(name):
     """F/m = 3 for 0.3 <= t < 0.7: v = 1.2, x(1) = 0.5*3*0.4^2 + 1.2*0.3. Polynomial, so round-off is all there is."""
-    engine, scene = peer(name), pushed(Pulse(value=6.0, start_s=0.3, duration_s=0.4))
+    engine, scene = installed(name), pushed(Pulse(value=6.0, start_s=0.3, duration_s=0.4))
     path = engine.compile(scene).simulate(Run(np.array([0.0, 0.5, 1.0])), engine.efforts(scene)[-(name not in RIGID)])
     assert path.markers["body"].velocity[:, 3] == pytest.approx([0.0, 0.6, 1.2], abs=1e-12)
     assert path.markers["body"].position[:, 0] == pytest.approx([0.0, 0.06, 0.24 + 0.36], abs=1e-12)
@@ -62,7 +54,7 @@ def test_divergence_is_a_status_with_the_good_part_kept(name, tmp_path, monkeypa
     scene = pushed(Constant(value=1.0))
     rail = scene.hinges[0]
     scene = replace(scene, hinges=(replace(rail, translation=replace(rail.translation, damping_Ns_m=-2000.0)),))
-    engine, times = peer(name), np.linspace(0.0, 2.0, 21)
+    engine, times = installed(name), np.linspace(0.0, 2.0, 21)
     path = engine.compile(scene).simulate(Run(times), COARSE[name] or engine.efforts(scene)[0])
     assert path.status == "diverged" and "t = " in path.message
     assert 1 <= len(path.times) < len(times)
@@ -71,7 +63,7 @@ def test_divergence_is_a_status_with_the_good_part_kept(name, tmp_path, monkeypa
 
 
 def test_mujoco_hooks_are_taken_away_again():
-    engine = peer("mujoco")
+    engine = installed("mujoco")
     import mujoco
 
     scene = pushed(Constant(value=1.0))
@@ -84,7 +76,7 @@ def test_mujoco_hooks_are_taken_away_again():
 
 @pytest.mark.parametrize("name", ["mujoco", "drake"])
 def test_what_a_library_would_reject_is_refused(name):
-    engine, scene = peer(name), pushed(Constant(value=1.0))
+    engine, scene = installed(name), pushed(Constant(value=1.0))
     impossible = replace(scene.bodies[0], inertia_kg_m2=((1.0, 0, 0), (0, 1.0, 0), (0, 0, 3.0)))
     scene = replace(scene, bodies=(impossible,))
     support = engine.supports(scene)
@@ -110,7 +102,7 @@ def test_trajectories_agree_within_their_refinement(seed):
     run = Run(np.linspace(0.0, 1.0, 11))
     finest, coarser = {}, {}
     for name in RIGID:
-        engine = peer(name)
+        engine = installed(name)
         model, efforts = engine.compile(scene), engine.efforts(scene)
         coarser[name], finest[name] = (model.simulate(run, effort) for effort in efforts[-2:])
     for marker in finest["mujoco"].markers:
@@ -130,8 +122,8 @@ def test_runs_agree_with_pinocchios(name, seed):
     """Free and ball joints on turned frames of turning bodies, where DART's speeds have axes of their own."""
     rng, apart = np.random.default_rng(300 + seed), {"drake": 1e-8, "dart": 1e-9, "opensim": 1e-9}[name]
     scene = random_scene(rng, ("free", "revolute", *KINDS), driven=True)
-    run, engine, fine = Run(np.linspace(0.0, 1.0, 6)), peer(name), Effort("tolerance", 1e-12, "DOP853")
-    theirs = peer("pinocchio").compile(scene).simulate(run, fine)
+    run, engine, fine = Run(np.linspace(0.0, 1.0, 6)), installed(name), Effort("tolerance", 1e-12, "DOP853")
+    theirs = installed("pinocchio").compile(scene).simulate(run, fine)
     ours = engine.compile(scene).simulate(run, fine if name in OF_SCIPY else engine.efforts(scene)[-1])
     assert ours.status == "finished", ours.message
     for marker, path in theirs.markers.items():
@@ -154,7 +146,7 @@ def test_prescribed_spin_up_is_followed_to_the_end(name):
         .marker("tip", "arm", offset=(1, 0, 0))
         .scene()
     )
-    engine = peer(name)
+    engine = installed(name)
     path = engine.compile(scene).simulate(Run(np.array([0.0, 2.0, 5.0])), engine.efforts(scene)[-1])
     angle = 4.0 / 4.0 * (2.0**2 / 2 - 2 * (4.0 / (2 * np.pi)) ** 2), 4.0 * (5.0 - 2.0)
     exact = np.column_stack([np.cos(angle), np.sin(angle)])
@@ -188,7 +180,7 @@ def spinning_ball(stiffness: float = 0.0) -> Scene:
 
 def test_drakes_ball_joint_turns_through_the_pitch_at_which_its_angles_are_singular():
     """A sphere turns uniformly: the rotation is that of |w| t about w."""
-    drake, run = peer("drake"), Run(np.linspace(0.0, 3.0, 13))
+    drake, run = installed("drake"), Run(np.linspace(0.0, 3.0, 13))
     path = drake.compile(spinning_ball()).simulate(run, drake.efforts(spinning_ball())[-1])
     assert path.status == "finished", path.message
     w = np.array([1.0, 6.0, 0.5])
@@ -202,11 +194,24 @@ def test_drakes_ball_joint_turns_through_the_pitch_at_which_its_angles_are_singu
 def test_the_spring_of_drakes_ball_joint_knows_its_turned_frame():
     """Energy stays while the frame is turned, though the spring turns with the joint's whole rotation."""
     scene = spinning_ball(stiffness=40.0)  # 40 N m/rad let it swing to 2.6 rad, short of the jump at half a turn
-    drake = peer("drake")
+    drake = installed("drake")
     path = drake.compile(scene).simulate(Run(np.linspace(0.0, 2.0, 21)), drake.efforts(scene)[-1])
     total = sum(path.energy.values())
     assert np.ptp(total) < 1e-9 * total[0]
     assert np.ptp(path.energy["spring"]) > 0.5 * total[0]
+
+
+def moves_as_in_pinocchio(name: str, turned: dict, *, offset: float, of_place: float, of_acceleration: float) -> None:
+    """A body in free flight and one on a ball joint, turned and turning alike, by points far from their origins."""
+    builder = SceneBuilder("turned", gravity=(0.3, -9.0, 2.0))
+    for body in ("free", "ball"):
+        builder.rigid_body(body, mass=2.0, com=(0.1, 0.2, -0.3), inertia=(0.1, 0.2, 0.25))
+        builder.marker(body, body, offset=(offset, offset, offset))
+    scene = builder.free("free", "ground", "free", **turned).spherical("ball", "ground", "ball", **turned).scene()
+    ours, theirs = (installed(each).compile(scene).evaluate() for each in (name, "pinocchio"))
+    for body, marker in theirs.markers.items():
+        assert ours.markers[body].position == pytest.approx(marker.position, abs=of_place), body
+        assert ours.markers[body].acceleration == pytest.approx(marker.acceleration, abs=of_acceleration), body
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-6, 2e-5, 3e-4, 9e-4, 1e-2, 1.0, 3.1])
@@ -214,20 +219,13 @@ def test_darts_small_rotations_are_as_exact_as_large_ones(angle: float) -> None:
     """DART's exponential map is off by a sixth of the cube of a small angle: by 5e-12 at 3e-4 rad."""
     axis = np.array([0.6, -0.64, 0.48])
     turned = {"quaternion": [np.cos(angle / 2.0), *(np.sin(angle / 2.0) * axis)], "angular_velocity": (1.0, 2.0, 3.0)}
-    builder = SceneBuilder("turned")
-    for name in ("free", "ball"):
-        builder.rigid_body(name, mass=2.0, com=(0.1, 0.2, -0.3), inertia=(0.1, 0.2, 0.25))
-        builder.marker(name, name, offset=(10.0, 10.0, 10.0))
-    scene = builder.free("free", "ground", "free", **turned).spherical("ball", "ground", "ball", **turned).scene()
-    ours, theirs = (peer(name).compile(scene).evaluate() for name in ("dart", "pinocchio"))
-    for name, marker in theirs.markers.items():
-        assert ours.markers[name].position == pytest.approx(marker.position, abs=5e-14), name
-        assert ours.markers[name].acceleration == pytest.approx(marker.acceleration, abs=1e-11), name
+    moves_as_in_pinocchio("dart", turned, offset=10.0, of_place=5e-14, of_acceleration=1e-11)
 
 
-def test_darts_loads_do_not_pile_up() -> None:
+@pytest.mark.parametrize("name", ["dart", "opensim"])
+def test_loads_do_not_pile_up(name: str) -> None:
     """DART keeps external forces until they are cleared: the second look at a state must be as the first."""
-    model = peer("dart").compile(pushed(Constant(value=6.0)))
+    model = installed(name).compile(pushed(Constant(value=6.0)))
     assert [model.evaluate().markers["body"].acceleration[3] for _ in range(3)] == [3.0, 3.0, 3.0]
 
 
@@ -242,7 +240,7 @@ def test_next_to_massless_bodies_bring_no_warnings_to_the_terminal(capfd: pytest
         .marker("body", "body")
         .scene()
     )
-    peer("dart").compile(scene).evaluate()
+    installed("dart").compile(scene).evaluate()
     out, err = capfd.readouterr()
     assert "arning" not in out + err
 
@@ -250,10 +248,10 @@ def test_next_to_massless_bodies_bring_no_warnings_to_the_terminal(capfd: pytest
 def test_what_dart_refuses_is_named() -> None:
     rods = SceneBuilder("loop").rigid_body("rod", mass=1.0, inertia=(1, 1, 1)).revolute("pin", "ground", "rod")
     scene = rods.closure("bolt", "spherical", "ground", "rod").marker("rod", "rod").scene()
-    support = peer("dart").supports(scene)
+    support = installed("dart").supports(scene)
     assert support.kind == "no" and 'closure "bolt": DART closes loops by impulses' in support.reason
     with pytest.raises(ValueError, match="by impulses"):
-        peer("dart").compile(scene)
+        installed("dart").compile(scene)
 
 
 @pytest.mark.parametrize("beside", [0.0, 1e-12, 1e-9, 1e-6, 1e-3])
@@ -264,20 +262,7 @@ def test_opensims_angles_of_balls_and_free_flight_may_be_singular(beside: float)
     turn = np.array([np.cos(half), 0.0, np.sin(half), 0.0])
     product = [first[0] * turn[0], first[1] * turn[0], first[0] * turn[2], first[1] * turn[2]]
     turned = {"quaternion": product, "angular_velocity": (1.0, 2.0, 3.0)}
-    builder = SceneBuilder("turned", gravity=(0.3, -9.0, 2.0))
-    for name in ("free", "ball"):
-        builder.rigid_body(name, mass=2.0, com=(0.1, 0.2, -0.3), inertia=(0.1, 0.2, 0.25))
-        builder.marker(name, name, offset=(1.0, 1.0, 1.0))
-    scene = builder.free("free", "ground", "free", **turned).spherical("ball", "ground", "ball", **turned).scene()
-    ours, theirs = (peer(name).compile(scene).evaluate() for name in ("opensim", "pinocchio"))
-    for name, marker in theirs.markers.items():
-        assert ours.markers[name].position == pytest.approx(marker.position, abs=1e-14), name
-        assert ours.markers[name].acceleration == pytest.approx(marker.acceleration, abs=1e-12), name
-
-
-def test_what_acts_in_opensim_is_replaced_at_every_look() -> None:
-    model = peer("opensim").compile(pushed(Constant(value=6.0)))
-    assert [model.evaluate().markers["body"].acceleration[3] for _ in range(3)] == [3.0, 3.0, 3.0]
+    moves_as_in_pinocchio("opensim", turned, offset=1.0, of_place=1e-14, of_acceleration=1e-12)
 
 
 def test_opensim_takes_no_inertia_without_mass() -> None:
@@ -288,10 +273,10 @@ def test_opensim_takes_no_inertia_without_mass() -> None:
         other.wheel("rotor", "hub", axis=(0, 0, 1), mass=mass, axial_inertia=0.02, transverse_inertia=0.01, speed=9.0)
         return other.marker("hub", "hub").scene()
 
-    support = peer("opensim").supports(with_rotor(0.0))
+    support = installed("opensim").supports(with_rotor(0.0))
     assert support.kind == "no" and 'without mass ("rotor")' in support.reason
     light = with_rotor(MASSLESS)
-    ours, theirs = (peer(name).compile(light).evaluate() for name in ("opensim", "pinocchio"))
+    ours, theirs = (installed(name).compile(light).evaluate() for name in ("opensim", "pinocchio"))
     assert ours.energy["kinetic"] == pytest.approx(theirs.energy["kinetic"], rel=1e-12) and ours.energy["kinetic"] > 0.8
 
 
@@ -304,7 +289,7 @@ def test_opensim_drives_what_has_no_inertia(kind: str, mass: float) -> None:
     builder.rigid_body("tool", mass=mass, inertia=(0.0, 0.0, 0.0)).marker("tool", "tool", offset=(0.0, 1.0, 0.0))
     drive = {"axis": (1.0, 0.0, 0.0), "prescribed": Sine(amplitude=0.3, angular_frequency_rad_s=2.0)}
     scene = getattr(builder, kind)("drive", "arm", "tool", parent_position=(1.0, 0.0, 0.0), **drive).scene()
-    ours, theirs = (peer(name).compile(scene).evaluate() for name in ("opensim", "pinocchio"))
+    ours, theirs = (installed(name).compile(scene).evaluate() for name in ("opensim", "pinocchio"))
     assert ours.markers["tool"].acceleration == pytest.approx(theirs.markers["tool"].acceleration, abs=1e-13)
     assert ours.drives["drive"] == pytest.approx(theirs.drives["drive"], abs=1e-14)
     assert ours.loads["pin"] == pytest.approx(theirs.loads["pin"], abs=1e-13)
