@@ -2,12 +2,7 @@
 
 from pathlib import Path
 
-import pytest
-
-from crosscheck.library.find import load_case
-from crosscheck.references.regenerate import regenerate
-from crosscheck.running.scheduler import Limits
-from tests.crosscheck.sessions import PROVIDER, copy_case, run_here
+from tests.crosscheck.sessions import referenced
 
 NAMES = ("fine", "stepper", "biased", "absent", "refuser", "raiser", "diverger", "diarist")
 RUN_FILE = """
@@ -41,10 +36,7 @@ engine = "stepper"
 
 def fake_project(folder: Path) -> Path:
     """Put the small case, as pendulum/single, and the fake engines into a folder, which is returned."""
-    case = copy_case(folder, RUN_FILE)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("crosscheck.references.routes.run_planned", run_here)
-        regenerate(load_case(case), provider=PROVIDER, limits=Limits(workers=1))
+    referenced(folder, RUN_FILE)
     makers = [f"def {name}(): return engines()[{name!r}]" for name in NAMES]
     text = "\n".join(["from tests.crosscheck.fake_engines import engines", *makers, ""])
     (folder / "fake_plug_ins.py").write_text(text, encoding="utf-8")

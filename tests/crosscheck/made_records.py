@@ -1,10 +1,12 @@
 """Records made by hand: what engines might have left behind, judged without running any."""
 
+import io
 import tomllib
 from collections.abc import Iterable
 
 import msgspec
 import numpy as np
+from rich.console import Console
 
 from crosscheck.judging.outcome import SessionOutcome, conclude
 from crosscheck.judging.results import collect
@@ -14,6 +16,8 @@ from crosscheck.library.case import RunFile
 from crosscheck.library.selection import joining, select
 from crosscheck.records.kinds import CaseRecord, RunRecord, VariantInfo
 from crosscheck.records.packing import pack
+from crosscheck.terminal.text import Verbosity
+from crosscheck.terminal.verdicts import print_outcome
 from flexmb.typing import Real
 
 TIMES = np.linspace(0.0, 1.0, 11)
@@ -49,13 +53,29 @@ def ladder(
     """Three tolerances of an engine that converge to the signals: off by 100, 10 and 1 times `spread` of them."""
     return [
         RunRecord(
-            case="made/made", variant=variant, role=role, engine=engine, version="1", scene="s", status="finished",
-            effort=f"rtol={rung}", effort_kind="tolerance", effort_method="m", effort_value=10.0 ** -(rung + 6),
-            rung=rung, rungs=3, evaluations=100 * (rung + 1), times=pack(TIMES),
+            case="made/made",
+            variant=variant,
+            role=role,
+            engine=engine,
+            version="1",
+            scene="s",
+            status="finished",
+            effort=f"rtol={rung}",
+            effort_kind="tolerance",
+            effort_method="m",
+            effort_value=10.0 ** -(rung + 6),
+            rung=rung,
+            rungs=3,
+            evaluations=100 * (rung + 1),
+            times=pack(TIMES),
             channels={name: pack(values * (1.0 + spread * 10.0 ** (2 - rung))) for name, values in signals.items()},
         )  # fmt: skip
         for rung in range(3)
     ]
+
+
+PAIR = [*ladder("one", {TIP: way()}), *ladder("two", {TIP: way()})]
+"""Two engines that converge to the same."""
 
 
 def ended(run: RunRecord, status: str, message: str = "for a reason", **changes: object) -> RunRecord:
@@ -64,8 +84,13 @@ def ended(run: RunRecord, status: str, message: str = "for a reason", **changes:
 
 
 def judged(
-    text: str, runs: Iterable[RunRecord], accepted: Accepted | None = None, strict: bool = False,
-    asked: tuple[str, ...] = (), basis: str = "", undetermined: tuple[str, ...] | msgspec.UnsetType = (),
+    text: str,
+    runs: Iterable[RunRecord],
+    accepted: Accepted | None = None,
+    strict: bool = False,
+    asked: tuple[str, ...] = (),
+    basis: str = "",
+    undetermined: tuple[str, ...] | msgspec.UnsetType = (),
     **others: object,
 ) -> SessionOutcome:
     """The outcome of a session that left these runs; `others` are more of its case's record, `basis` its scenes',
@@ -85,3 +110,9 @@ def single(outcome: SessionOutcome) -> Verdict:
     """The only verdict."""
     (verdict,) = outcome.all
     return verdict
+
+
+def told(outcome: SessionOutcome, verbosity: Verbosity = Verbosity.NORMAL) -> tuple[int, str]:
+    """The exit code, and what the terminal shows."""
+    text = io.StringIO()
+    return print_outcome(Console(file=text, width=300), outcome, verbosity), text.getvalue()

@@ -7,6 +7,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from crosscheck.judging.outcome import SessionOutcome, conclude
 from crosscheck.judging.results import collect
 from crosscheck.judging.verdict import Verdict
@@ -14,9 +16,10 @@ from crosscheck.library.find import Case, load_case, shipped_cases
 from crosscheck.records.archive import read
 from crosscheck.records.kinds import CaseRecord
 from crosscheck.records.session import last_session
+from crosscheck.references.regenerate import regenerate
 from crosscheck.running.installed import require_engines
 from crosscheck.running.job import Job
-from crosscheck.running.scheduler import Event, Events, Work
+from crosscheck.running.scheduler import Event, Events, Limits, Work
 from crosscheck.running.sweep import run_planned, sweep
 
 CASE = Path(__file__).parent / "data" / "pendulum" / "single"
@@ -103,3 +106,24 @@ def run_here(
 ) -> None:
     """What `run_planned` records, in this process."""
     run_planned(plans, asked, records, **{**options, "scheduler": here})
+
+
+def referenced(folder: Path, run_file: str) -> Path:
+    """The small case with this run file and its stored reference, whose routes run in this process."""
+    case = copy_case(folder, run_file)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("crosscheck.references.routes.run_planned", run_here)
+        regenerate(load_case(case), provider=PROVIDER, limits=Limits(workers=1))
+    return case
+
+
+def copy_of(case: Path, parent: Path) -> Path:
+    """A case folder again below another folder, for changing."""
+    return Path(shutil.copytree(case, parent / case.parent.name / case.name))
+
+
+def edit(file: Path, old: str, new: str) -> None:
+    """Replace a text that has to be there."""
+    text = file.read_text(encoding="utf-8")
+    assert old in text
+    file.write_text(text.replace(old, new), encoding="utf-8")

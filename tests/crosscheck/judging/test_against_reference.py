@@ -17,8 +17,7 @@ from crosscheck.records.archive import read
 from crosscheck.records.kinds import ReferenceGoals
 from crosscheck.records.packing import pack, unpack
 from crosscheck.records.session import last_session
-from crosscheck.references.regenerate import regenerate
-from tests.crosscheck.sessions import PROVIDER, copy_case, run_here, sweep_here
+from tests.crosscheck.sessions import copy_of, edit, referenced, sweep_here
 
 CASE = """
 [[variant]]
@@ -56,11 +55,7 @@ engine = "stepper"
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A case with its reference."""
-    found = copy_case(tmp_path_factory.mktemp("referenced"), CASE)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("crosscheck.references.routes.run_planned", run_here)
-        regenerate(load_case(found), provider=PROVIDER)
-    return found
+    return referenced(tmp_path_factory.mktemp("referenced"), CASE)
 
 
 def judged(folder: Path, records: Path, asked: tuple[str, ...] = (), *, alone: bool = False) -> SessionOutcome:
@@ -225,17 +220,3 @@ def test_times_that_both_have() -> None:
     assert shared_times(np.linspace(0.0, 1.0, 6), far) is None
     assert shared_times(np.array([0.0]), given[:1]) == 0
     assert shared_times(given, given[:1]) is None
-
-
-def copy_of(folder: Path, parent: Path) -> Path:
-    target = parent / folder.parent.name / folder.name
-    target.mkdir(parents=True)
-    for file in folder.iterdir():
-        (target / file.name).write_bytes(file.read_bytes())
-    return target
-
-
-def edit(file: Path, old: str, new: str) -> None:
-    text = file.read_text(encoding="utf-8")
-    assert old in text
-    file.write_text(text.replace(old, new), encoding="utf-8")

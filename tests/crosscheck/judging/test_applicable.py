@@ -3,7 +3,6 @@
 What the motion leaves open is compared with nothing; what that is, no engine decides.
 """
 
-import io
 from dataclasses import dataclass, replace
 from pathlib import Path
 from xml.etree import ElementTree
@@ -11,7 +10,6 @@ from xml.etree import ElementTree
 import msgspec
 import numpy as np
 import pytest
-from rich.console import Console
 
 from crosscheck.engines.answers import BrokenContract, checked_run
 from crosscheck.engines.contract import Effort, Run
@@ -22,14 +20,12 @@ from crosscheck.records.kinds import RunRecord
 from crosscheck.report.ci import write_summary
 from crosscheck.report.junit import write_junit
 from crosscheck.terminal.text import Verbosity
-from crosscheck.terminal.verdicts import print_outcome
 from tests.crosscheck.fake_engines import Fake, Pendulum
 from tests.crosscheck.fake_engines import engines as fakes
-from tests.crosscheck.made_records import ONE_PAIR, TIP, ended, judged, ladder, way
+from tests.crosscheck.made_records import ONE_PAIR, PAIR, TIP, ended, judged, ladder, told, way
 from tests.crosscheck.sessions import compare_engines
 from tests.flexmb.closure import mechanisms
 
-PAIR = [*ladder("one", {TIP: way()}), *ladder("two", {TIP: way()})]
 VELOCITY = "marker:tip.velocity"
 BOTH = ONE_PAIR.replace("marker:tip.position", "marker")
 THREE = ("one", "two", "guest")
@@ -46,12 +42,6 @@ def junit(outcome: SessionOutcome, folder: Path) -> ElementTree.Element:
         attribute = "failures" if what == "failure" else what
         assert sum(int(suite.get(attribute, "0")) for suite in root) == len(root.findall(f".//{what}"))
     return root
-
-
-def told(outcome: SessionOutcome, verbosity: Verbosity = Verbosity.NORMAL) -> tuple[int, str]:
-    """The exit code, and what the terminal shows."""
-    text = io.StringIO()
-    return print_outcome(Console(file=text, width=200), outcome, verbosity), text.getvalue()
 
 
 def test_a_guest_that_refuses_is_listed_once_and_is_no_verdict() -> None:

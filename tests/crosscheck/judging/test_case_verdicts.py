@@ -1,5 +1,6 @@
 """What becomes of recorded runs: nothing that is missing, late, elsewhere or apart at one sample goes unnoticed."""
 
+import re
 from typing import get_args
 
 import msgspec
@@ -12,7 +13,7 @@ from crosscheck.judging.verdict import SEVERITY, STATUSES
 from crosscheck.records.kinds import RunStatus
 from crosscheck.records.packing import pack
 from crosscheck.report.views import SYMBOLS
-from tests.crosscheck.made_records import ONE_PAIR, TIMES, TIP, ended, judged, ladder, run_file, single, way
+from tests.crosscheck.made_records import ONE_PAIR, PAIR, TIMES, TIP, ended, judged, ladder, run_file, single, way
 
 ENDINGS = [status for status in SEVERITY if status not in ("agree", "differ", "unresolved")]
 CONSERVED = """
@@ -46,7 +47,7 @@ goals = { "marker:tip.position" = 0.5 }
 
 
 def test_two_that_converge_to_the_same_agree() -> None:
-    verdict = single(judged(ONE_PAIR, [*ladder("one", {TIP: way()}), *ladder("two", {TIP: way()})]))
+    verdict = single(judged(ONE_PAIR, PAIR))
     assert (verdict.status, verdict.ok, verdict.level) == ("agree", True, "rigid")
     assert np.isclose(verdict.U, 2 * 3 * 9e-6, rtol=1e-3)
 
@@ -134,48 +135,39 @@ def test_within_a_variant_the_refined_run_does_not_matter() -> None:
     assert single(judged(text, runs)).status == "agree"
 
 
-@pytest.mark.parametrize("rung", range(NEEDED - 1))
-@pytest.mark.parametrize("status", ["failed", "crashed", "did not finish", "refused"])
-def test_an_engine_that_fails_a_lower_effort_has_failed(rung: int, status: str) -> None:
-    one, two = ladder("one", {TIP: way()}), ladder("two", {TIP: way()})
-    one[rung] = ended(one[rung], status, "no memory left")
-    verdict = single(judged(ONE_PAIR, [*one, *two]))
-    assert (verdict.status, verdict.ok) == ("failed" if status == "refused" else status, False)
-    assert f"effort {one[rung].effort} " in verdict.reason and "no memory left" in verdict.reason
+WITHOUT_RESULT = ("failed", "crashed", "did not finish", "refused")
+FINEST = NEEDED - 1
+# What becomes of efforts of one engine, by their numbers; the verdict, and what it names.
+EFFORTS = [
+    ({rung: status}, "failed" if status == "refused" else status, f"effort rtol={rung} ")
+    for rung in range(FINEST)
+    for status in WITHOUT_RESULT
+]
+EFFORTS += [
+    ({FINEST: "refused"}, "failed", ""),  # else all efforts but one could be passed over
+    (dict.fromkeys(range(NEEDED), "refused"), "refused", ""),  # the scene as a whole
+    *[({**dict.fromkeys(range(last), "crashed"), last: "failed"}, "failed", f"of {last}") for last in range(NEEDED)],
+    *[({rung: None}, "unresolved", "is not recorded") for rung in range(FINEST)],
+    ({1: "without the channel"}, "unresolved", "does not offer the channel"),
+]
 
 
-@pytest.mark.parametrize("some", [True, False])
-def test_a_scene_is_refused_as_a_whole(some: bool) -> None:
-    """Whoever refuses the finest effort alone has failed: else all efforts but one could be passed over."""
-    one, two = ladder("one", {TIP: way()}), ladder("two", {TIP: way()})
-    one = [ended(run, "refused", "no such hinge") if not some or run is one[-1] else run for run in one]
-    verdict = single(judged(ONE_PAIR, [*one, *two]))
-    assert (verdict.status, verdict.ok) == ("failed" if some else "refused", False)
-
-
-@pytest.mark.parametrize("last", range(NEEDED))
-def test_of_several_efforts_that_fail_the_finest_is_named(last: int) -> None:
-    one, two = ladder("one", {TIP: way()}), ladder("two", {TIP: way()})
-    for rung in range(last):
-        one[rung] = ended(one[rung], "crashed", f"of effort {rung}")
-    one[last] = ended(one[last], "failed", "the finest of them")
-    verdict = single(judged(ONE_PAIR, [*one, *two]))
-    assert (verdict.status, verdict.ok) == ("failed", False)
-    assert "the finest of them" in verdict.reason and "of effort" not in verdict.reason
-
-
-@pytest.mark.parametrize("rung", range(NEEDED - 1))
-def test_a_lower_effort_that_is_not_recorded_leaves_the_uncertainty_unknown(rung: int) -> None:
-    one, two = ladder("one", {TIP: way()}), ladder("two", {TIP: way()})
-    verdict = single(judged(ONE_PAIR, [*one[:rung], *one[rung + 1 :], *two]))
-    assert (verdict.status, "is not recorded" in verdict.reason) == ("unresolved", True)
-
-
-def test_a_lower_effort_without_the_channel_leaves_the_uncertainty_unknown() -> None:
-    one, two = ladder("one", {TIP: way()}), ladder("two", {TIP: way()})
-    one[1] = msgspec.structs.replace(one[1], channels={})
-    verdict = single(judged(ONE_PAIR, [*one, *two]))
-    assert (verdict.status, "does not offer the channel" in verdict.reason) == ("unresolved", True)
+@pytest.mark.parametrize(("efforts", "status", "said"), EFFORTS, ids=str)
+def test_an_engine_may_not_pass_over_efforts(efforts: dict[int, str | None], status: str, said: str) -> None:
+    """The finest effort that has no result is named, and no other."""
+    one = []
+    for rung, run in enumerate(ladder("one", {TIP: way()})):
+        match efforts.get(rung, "finished"):
+            case "finished":
+                one.append(run)
+            case "without the channel":
+                one.append(msgspec.structs.replace(run, channels={}))
+            case str(ending):
+                one.append(ended(run, ending, f"no memory of {rung}"))
+    verdict = single(judged(ONE_PAIR, [*one, *ladder("two", {TIP: way()})]))
+    assert (verdict.status, verdict.ok, said in verdict.reason) == (status, False, True), verdict.reason
+    if status != "unresolved":
+        assert set(re.findall("no memory of .", verdict.reason)) == {f"no memory of {max(efforts)}"}
 
 
 def test_an_effort_too_coarse_to_be_followed_is_left_out() -> None:
@@ -234,16 +226,14 @@ def test_a_pattern_that_names_nothing_judged_is_not_left_out_in_silence(what: st
     value = "2.0" if what == "scales" else "[1e-6, 1e-5]"
     text = ONE_PAIR + f'{what} = {{ "marker:top.position" = {value} }}\n'
     text += 'expect = "differ"\nreason = "so"\n' if what == "band" else ""
-    runs = [*ladder("one", {TIP: way()}), *ladder("two", {TIP: way()})]
-    last = judged(text, runs).all[-1]
+    last = judged(text, PAIR).all[-1]
     assert (last.channel, last.status, last.ok) == ("marker:top.position", "unresolved", False)
-    assert [each.channel for each in judged(text.replace("top", "tip"), runs).all] == [TIP]
+    assert [each.channel for each in judged(text.replace("top", "tip"), PAIR).all] == [TIP]
 
 
 def test_a_scale_replaces_the_range_where_its_pattern_is_the_most_specific() -> None:
     text = ONE_PAIR + 'scales = { "marker" = 5.0, "marker:tip.position" = 100.0 }\n'
-    runs = [*ladder("one", {TIP: way()}), *ladder("two", {TIP: way()})]
-    assert single(judged(text, runs)).scale == 100.0
+    assert single(judged(text, PAIR)).scale == 100.0
 
 
 @pytest.mark.parametrize(
@@ -333,5 +323,4 @@ goals = { "marker:tip.position" = 1e-3 }
 
 def test_where_nothing_is_judged_no_scale_is_unused() -> None:
     text = ONE_PAIR.replace(TIP, "load:pivot") + 'scales = { "marker:top.position" = 2.0 }\n'
-    runs = [*ladder("one", {TIP: way()}), *ladder("two", {TIP: way()})]
-    assert single(judged(text, runs)).status == "did not run"
+    assert single(judged(text, PAIR)).status == "did not run"

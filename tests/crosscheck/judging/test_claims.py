@@ -19,7 +19,7 @@ from crosscheck.library.claims import ClaimedEfforts, ClaimedFailure, ClaimedGoa
 from crosscheck.records.kinds import RunRecord
 from crosscheck.records.packing import pack
 from crosscheck.report.ci import write_summary
-from tests.crosscheck.made_records import ONE_PAIR, TIMES, TIP, ended, judged, ladder, single, way
+from tests.crosscheck.made_records import ONE_PAIR, PAIR, TIMES, TIP, ended, judged, ladder, single, way
 
 ROUGH = 1e-2  # U is a few times this part of the range: far above the goal of 1e-3
 PLACE = "crosscheck-expect.toml: $.goal[0]"
@@ -244,9 +244,8 @@ def test_a_crash_is_no_expected_failure(status: str) -> None:
 
 def test_an_expected_lack_of_resolution_is_bounded_too() -> None:
     text = ONE_PAIR.replace("1e-3", "1e-6") + f'expect = "unresolved"\nband = {{ "{TIP}" = [BAND] }}\nreason = "so"\n'
-    runs = [*ladder("one", {TIP: way()}), *ladder("two", {TIP: way()})]
     for band, ok in (("1e-5, 1e-4", True), ("1e-7, 1e-6", False), ("1e-3, 1e-2", False)):
-        verdict = single(judged(text.replace("BAND", band), runs))
+        verdict = single(judged(text.replace("BAND", band), PAIR))
         assert (verdict.status, verdict.ok) == ("unresolved", ok)
 
 

@@ -13,7 +13,7 @@ from crosscheck.judging.uncertainty import Uncertainty, spatial
 from crosscheck.judging.verdict import Finding, Signal, Verdict, compare, conserve
 from crosscheck.library.accepted import Figure, dumps
 from crosscheck.records.kinds import CaseRecord, VariantInfo
-from tests.crosscheck.made_records import ONE_PAIR, TIMES, TIP, ended, judged, ladder, run_file, single, way
+from tests.crosscheck.made_records import ONE_PAIR, PAIR, TIMES, TIP, ended, judged, ladder, run_file, single, way
 
 FORCE = "load:pivot.force"
 CONTROL = """
@@ -39,7 +39,12 @@ expect = "differ"
 band = [0.1, 1.0]
 reason = "a thruster"
 """
-NO_CLAIMS = {"case_goal": None, "goal_reason": "", "own_failure": "", "advice": ""}
+PLAIN = {
+    "case": "made/made", "variant_a": "rigid", "engine_a": "one", "variant_b": "rigid", "engine_b": "two",
+    "level": "rigid", "goal": 1e-3, "outside": "", "accepted": None, "worse": "", "stale": "", "expected_reason": "",
+    "case_goal": None, "goal_reason": "", "own_failure": "", "advice": "",
+}  # fmt: skip
+"""What verdicts say here where a test names nothing else."""
 
 
 def signal(level: float, doubt: float, sizes: tuple[float, ...] = (1.0,)) -> Signal:
@@ -64,10 +69,8 @@ def plain(verdict: Verdict) -> dict:
 
 def test_a_control_says_all_of_itself() -> None:
     control, _ = everything().all
-    assert plain(control) == {
-        "case": "made/made", "comparison": "fault", "kind": "control", "channel": TIP, "variant_a": "rigid",
-        "engine_a": "one", "variant_b": "rigid", "engine_b": "two", "level": "rigid", "status": "differ",
-        "expected": "differ", "goal": 1e-3, "outside": "", "accepted": None, "worse": "", "stale": "", **NO_CLAIMS,
+    assert plain(control) == PLAIN | {
+        "comparison": "fault", "kind": "control", "channel": TIP, "status": "differ", "expected": "differ",
         "expected_reason": "negative control (mass of rod): the fault must be noticed",
     }  # fmt: skip
     assert (control.ok, control.scale) == (True, 4.0)
@@ -76,9 +79,8 @@ def test_a_control_says_all_of_itself() -> None:
 
 
 def test_a_control_of_the_whole_scene_says_so_and_needs_its_runs() -> None:
-    runs = [*ladder("one", {TIP: way()}), *ladder("two", {TIP: way()})]
     text = CONTROL.split("[[conservation]]")[0].replace('target = "rod"\n', "")
-    verdict = single(judged(text, runs))
+    verdict = single(judged(text, PAIR))
     assert (verdict.status, verdict.expected_reason[:35]) == ("did not run", "negative control (mass of the scene")
     faulty = ladder("one", {TIP: way(1.5)}, role="control:fault")[-1:]
     assert single(judged(text, [*ladder("two", {TIP: way()}), *faulty])).status == "did not run"
@@ -86,11 +88,10 @@ def test_a_control_of_the_whole_scene_says_so_and_needs_its_runs() -> None:
 
 def test_a_conserved_quantity_says_all_of_itself() -> None:
     _, conserved = everything().all
-    assert plain(conserved) == {
-        "case": "made/made", "comparison": "linear momentum conserved", "kind": "conservation",
-        "channel": "momentum.linear", "variant_a": "rigid", "engine_a": "two", "variant_b": "rigid",
-        "engine_b": "conservation law", "level": "rigid", "status": "differ", "expected": "differ", "goal": 1e-3,
-        "outside": "", "accepted": None, "worse": "", "stale": "", "expected_reason": "a thruster", **NO_CLAIMS,
+    assert plain(conserved) == PLAIN | {
+        "comparison": "linear momentum conserved", "kind": "conservation", "channel": "momentum.linear",
+        "engine_a": "two", "engine_b": "conservation law", "status": "differ", "expected": "differ",
+        "expected_reason": "a thruster",
     }  # fmt: skip
     assert (conserved.U, conserved.ok) == (None, True)
     assert np.isclose(conserved.E, 0.5) and np.isclose(conserved.scale, np.sqrt(3.0))
@@ -99,16 +100,13 @@ def test_a_conserved_quantity_says_all_of_itself() -> None:
 
 def test_a_comparison_says_all_of_itself() -> None:
     place = f"{TIP} | one (rigid) | two (rigid)"
-    runs = [*ladder("one", {TIP: way()}), *ladder("two", {TIP: way()})]
-    verdict = single(judged(ONE_PAIR, runs, {"both": {place: Figure(0.0, 1.8e-5)}}))
-    assert plain(verdict) == {
-        "case": "made/made", "comparison": "both", "kind": "comparison", "channel": TIP, "variant_a": "rigid",
-        "engine_a": "one", "variant_b": "rigid", "engine_b": "two", "level": "rigid", "status": "agree",
-        "expected": "agree", "goal": 1e-3, "outside": "", "accepted": {"E": 0.0, "U": 1.8e-5, "of": ""}, "worse": "",
-        "stale": "", **NO_CLAIMS, "expected_reason": "",
+    verdict = single(judged(ONE_PAIR, PAIR, {"both": {place: Figure(0.0, 1.8e-5)}}))
+    assert plain(verdict) == PLAIN | {
+        "comparison": "both", "kind": "comparison", "channel": TIP, "status": "agree", "expected": "agree",
+        "accepted": {"E": 0.0, "U": 1.8e-5, "of": ""},
     }  # fmt: skip
     assert verdict.reason == "0 of the range apart, within the uncertainty 5.4e-05"
-    other = single(judged(ONE_PAIR + 'reason = "why"\n', [*runs[:3], *ladder("two", {TIP: way(2.0)})]))
+    other = single(judged(ONE_PAIR + 'reason = "why"\n', [*PAIR[:3], *ladder("two", {TIP: way(2.0)})]))
     assert (other.status, other.outside, other.expected_reason) == ("differ", "", "why")
 
 
@@ -353,17 +351,14 @@ def test_channels_that_one_side_lacks() -> None:
 
 def test_an_unused_pattern_says_all_of_itself() -> None:
     text = ONE_PAIR + 'scales = { "marker:top.position" = 2.0 }\nreason = "why"\n'
-    runs = [*ladder("one", {TIP: way()}), *ladder("two", {TIP: way()})]
-    unused = judged(text, runs).all[-1]
+    unused = judged(text, PAIR).all[-1]
     said = 'a scale is given for "marker:top.position", which is no channel judged here'
-    assert plain(unused) == {
-        "case": "made/made", "comparison": "both", "kind": "comparison", "channel": "marker:top.position",
-        "variant_a": "rigid", "engine_a": "one", "variant_b": "rigid", "engine_b": "two", "level": "rigid",
-        "status": "unresolved", "expected": "agree", "goal": 0.0, "outside": said, "accepted": None, "worse": "",
-        "stale": "", **NO_CLAIMS, "expected_reason": "why",
+    assert plain(unused) == PLAIN | {
+        "comparison": "both", "kind": "comparison", "channel": "marker:top.position", "status": "unresolved",
+        "expected": "agree", "goal": 0.0, "outside": said, "expected_reason": "why",
     }  # fmt: skip
     assert unused.reason == said
-    assert single(judged(text, runs[:3])).status == "did not run"
+    assert single(judged(text, PAIR[:3])).status == "did not run"
 
 
 def test_an_unused_band_is_named_as_one() -> None:
@@ -393,7 +388,7 @@ def test_a_missing_side_is_told_once_for_each_goal(broken: str) -> None:
 def test_bounds_are_held_against_what_was_expected_alone() -> None:
     """An expected difference that is none, or a drift that is none, is not as expected; its size is no matter."""
     text = ONE_PAIR + 'expect = "differ"\nreason = "why"\nband = { "marker:tip" = [0.1, 1.0] }\n'
-    verdict = single(judged(text, [*ladder("one", {TIP: way()}), *ladder("two", {TIP: way()})]))
+    verdict = single(judged(text, PAIR))
     assert (verdict.status, verdict.outside, verdict.ok) == ("agree", "", False)
     assert verdict.reason == "0 of the range apart, within the uncertainty 5.4e-05"
 
@@ -466,7 +461,7 @@ scales = {{ "{TIP}" = 1.0 }}
 
 def test_a_control_has_no_accepted_figure() -> None:
     place = f"{TIP} | one (rigid) | two (rigid)"
-    runs = [*ladder("one", {TIP: way()}), *ladder("two", {TIP: way()})]
+    runs = [*PAIR]
     runs += ladder("one", {TIP: way(1.5)}, role="control:fault")[-1:]
     text = CONTROL.split("[[conservation]]")[0]
     control = single(judged(text, runs, {"fault": {place: Figure(1e-9, 1e-9)}}))

@@ -3,14 +3,12 @@ case must say why, and of a guest it must be as others have it.
 What was asked for and is not there is never green either.
 """
 
-import io
 from pathlib import Path
 from xml.etree import ElementTree
 
 import msgspec
 import numpy as np
 import pytest
-from rich.console import Console
 
 from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.judging.verdict import SEVERITY
@@ -18,9 +16,8 @@ from crosscheck.library.accepted import Figure, key
 from crosscheck.report.ci import write_summary
 from crosscheck.report.junit import write_junit
 from crosscheck.terminal.text import Verbosity
-from crosscheck.terminal.verdicts import print_outcome
 from flexmb.typing import Real
-from tests.crosscheck.made_records import ONE_PAIR, TIMES, TIP, ended, judged, ladder, way
+from tests.crosscheck.made_records import ONE_PAIR, PAIR, TIMES, TIP, ended, judged, ladder, told, way
 
 VELOCITY = "marker:tip.velocity"
 ASKED = ("one", "two", "guest")
@@ -35,11 +32,6 @@ def session(values: Real | None, channel: str = VELOCITY, **options: object) -> 
     """The outcome of a session with a guest that offers these values of a channel without a goal."""
     offered = {TIP: way()} | ({} if values is None else {channel: values})
     return judged(ONE_PAIR, [*NAMED, *ladder("guest", offered)], asked=ASKED, **options)
-
-
-def told(outcome: SessionOutcome, verbosity: Verbosity = Verbosity.NORMAL) -> tuple[int, str]:
-    text = io.StringIO()
-    return print_outcome(Console(file=text, width=300), outcome, verbosity), text.getvalue()
 
 
 OPEN = """
@@ -211,7 +203,6 @@ goals = { "marker:tip.velocity" = 1e-3 }
 
 
 BESIDE = ONE_PAIR.replace('engines = ["one", "two"]', 'engines = ["one", "two"]\nalso = ["three"]', 1)
-PAIR = [*ladder("one", {TIP: way()}), *ladder("two", {TIP: way()})]
 WIDE = ONE_PAIR.replace("marker:tip.position", "marker")
 
 

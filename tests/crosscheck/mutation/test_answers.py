@@ -24,7 +24,6 @@ from crosscheck.mutation.campaign import run_campaign
 from crosscheck.mutation.score import MutationScore
 from crosscheck.mutation.subject import subject
 from crosscheck.records.kinds import Record, RunRecord
-from crosscheck.references.regenerate import regenerate
 from crosscheck.running.execute import execute
 from crosscheck.running.plan import plan
 from flexmb.scene.bodies import Node, RigidBody
@@ -32,7 +31,7 @@ from flexmb.scene.connectors import AngularSpring, SpringDamper
 from flexmb.scene.hinges import AngularCoordinate, Revolute
 from flexmb.scene.schema import Marker, Scene, Wheel
 from flexmb.typing import Real
-from tests.crosscheck.sessions import PROVIDER, copy_case, run_here
+from tests.crosscheck.sessions import PROVIDER, copy_case, referenced, run_here
 
 TIMES = np.linspace(0.0, 1.0, 5)
 ARM = RigidBody(
@@ -192,11 +191,7 @@ engine = "stepper"
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    found = copy_case(tmp_path_factory.mktemp("referenced"), CASE)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("crosscheck.references.routes.run_planned", run_here)
-        regenerate(load_case(found), provider=PROVIDER)
-    return found
+    return referenced(tmp_path_factory.mktemp("referenced"), CASE)
 
 
 def campaign(folder: Path, out: Path, engine: str) -> MutationScore:

@@ -17,7 +17,7 @@ from crosscheck.references.regenerate import regenerate as make_again
 from crosscheck.running.pool import run_jobs
 from crosscheck.running.scheduler import Limits, Scheduler
 from crosscheck.running.sweep import run_planned
-from tests.crosscheck.sessions import CASE, PROVIDER, copy_case, run_here
+from tests.crosscheck.sessions import CASE, PROVIDER, copy_case, copy_of, edit, run_here
 
 VARIANT = """
 [[variant]]
@@ -81,12 +81,6 @@ def refusal(folder: Path) -> str:
     return str(refused.value)
 
 
-def edit(file: Path, old: str, new: str) -> None:
-    text = file.read_text(encoding="utf-8")
-    assert old in text
-    file.write_text(text.replace(old, new), encoding="utf-8")
-
-
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A case with its reference."""
@@ -98,11 +92,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def copied(made: Path, tmp_path: Path) -> Path:
     """The same case, for changing."""
-    target = tmp_path / made.parent.name / made.name
-    target.mkdir(parents=True)
-    for file in made.iterdir():
-        (target / file.name).write_bytes(file.read_bytes())
-    return target
+    return copy_of(made, tmp_path)
 
 
 def test_a_reference_says_what_is_known(made: Path) -> None:

@@ -16,7 +16,6 @@ from crosscheck import cli
 from crosscheck.engines.contract import Effort
 from crosscheck.library.case import CaseError
 from crosscheck.library.find import Case, load_case, resolve
-from crosscheck.references.regenerate import regenerate
 from crosscheck.running.job import Job
 from crosscheck.running.plan import plan
 from crosscheck.running.scheduler import Limits
@@ -29,7 +28,7 @@ from crosscheck.timing.facts import UNSAID, facts_of
 from crosscheck.timing.page import folder_name, write_case, write_index
 from crosscheck.timing.rivals import find_rivals
 from crosscheck.timing.turns import CompileTimes, FirstSolve, Sample, Timed, Turn, TurnFailure, in_turns, take_turn
-from tests.crosscheck.sessions import copy_case, run_here
+from tests.crosscheck.sessions import referenced, run_here
 
 PROVIDER = "tests.crosscheck.timing.racing_engines:engines"
 SHIPPED = "crosscheck.engines.registry:engines"
@@ -67,11 +66,8 @@ engine = "stepper"
 def case(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Case]:
     """The small case with a reference; trials run in this process, turns in workers where nothing else is said."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("crosscheck.references.routes.run_planned", run_here)
         patch.setattr("crosscheck.timing.rivals.run_planned", run_here)
-        folder = copy_case(tmp_path_factory.mktemp("timing"), CASE)
-        regenerate(load_case(folder), provider=PROVIDER, limits=LIMITS)
-        yield load_case(folder)
+        yield load_case(referenced(tmp_path_factory.mktemp("timing"), CASE))
 
 
 @pytest.fixture
