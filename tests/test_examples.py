@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.repo.examples import FOLDER, PAGE, PICTURES, Example, examples, page
+from tests.repo.examples import FOLDER, PICTURES, Example, examples
 
 LARGEST = 100_000  # bytes of a picture
 
@@ -24,10 +24,6 @@ def test_an_example_has_one_idea_and_ends_with_its_check(example: Example) -> No
     assert "\nassert " in example.code[-1] or example.code[-1].startswith("assert ")
     lines = [line for code in example.code for line in code.splitlines() if line.strip()]
     assert len(lines) <= 80 and max(len(line) for line in lines) <= 120
-
-
-def test_the_page_is_what_the_generator_writes() -> None:
-    assert PAGE.read_text(encoding="utf-8") == page(), "run `python -m tests.repo.examples`"
 
 
 def test_pictures_are_those_of_the_examples_and_small() -> None:

@@ -12,7 +12,7 @@ from crosscheck.engines.registry import engine
 from flexmb.scene.files import load_scene
 from flexmb.scene.schema import Cylindrical, Revolute
 from flexmb.typing import Real
-from tests.cases.test_rigid_closed_forms import closed_form
+from tests.cases.shipped import closed_form
 
 CASES = Path(__file__).parents[2] / "cases"
 ANDREWS = load_scene(CASES / "closed_chains" / "andrews" / "scene.toml")

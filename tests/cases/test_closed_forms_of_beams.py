@@ -1,8 +1,5 @@
 """The closed forms of beams, rotors and booms against routes that share nothing with them: elements, ODE solvers."""
 
-from importlib.util import module_from_spec, spec_from_file_location
-from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
@@ -10,18 +7,9 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import eigh, eigvals
 
 from flexmb.typing import Real
+from tests.cases.shipped import closed_form
 
-CASES = Path(__file__).parents[2] / "cases"
 ELEMENTS = 40
-
-
-def closed_form(case: str) -> ModuleType:
-    """The module exact.py of a case."""
-    spec = spec_from_file_location(f"closed form of {case}", CASES / case / "exact.py")
-    assert spec is not None and spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def beam_matrices(length: float, stiffness: float, mass: float) -> tuple[Real, Real, Real]:

@@ -8,13 +8,10 @@ from msgspec.structs import replace
 from scipy.optimize import brentq
 
 from crosscheck.engines.registry import engine
-from crosscheck.library.find import load_case
-from crosscheck.report import write_all
-from crosscheck.running.sweep import sweep
 from flexmb.run.simulate import simulate
 from flexmb.scene.files import load_scene
 from flexmb.scene.schema import Scene
-from tests.crosscheck.sessions import here
+from tests.cases.shipped import noticed_controls
 
 CASES = Path(__file__).parents[2] / "cases"
 BOOM = CASES / "deploying_boom"
@@ -88,15 +85,7 @@ def test_boom_ends_straight_at_its_full_length():
 
 
 def test_negative_controls_of_the_rigid_boom_are_noticed(tmp_path):
-    for module in ("pinocchio", "mujoco"):
-        pytest.importorskip(module)
-    records = tmp_path / "records.jsonl"
-    sweep([load_case(BOOM / "rigid")], ("native", "pinocchio", "mujoco"), records, scheduler=here)
-    outcome, _ = write_all(records, tmp_path)
-    controls = [verdict for verdict in outcome.all if verdict.kind == "control"]
-    assert {verdict.comparison for verdict in controls} == {
+    assert noticed_controls("deploying_boom/rigid", tmp_path) == {
         "third member 1 % too heavy", "second elbow turned the other way", "mounting of the boom transposed",
         "latch spring 1 % too stiff",
     }  # fmt: skip
-    assert all(verdict.status == "differ" for verdict in controls)
-    assert outcome.ok, outcome.headline

@@ -1,10 +1,6 @@
 """Linkages that move though counting says they cannot: closed forms close the loop, loads are not determined by the
 motion, and a bar that is a little off locks it."""
 
-from importlib.util import module_from_spec, spec_from_file_location
-from pathlib import Path
-from types import ModuleType
-
 import numpy as np
 import pytest
 from msgspec.structs import replace
@@ -14,22 +10,15 @@ from crosscheck.engines.registry import engine
 from flexmb import compile
 from flexmb.scene.files import load_scene
 from flexmb.scene.schema import Scene
+from tests.cases.shipped import CASES, closed_form
 
-FAMILY = Path(__file__).parents[2] / "cases" / "closed_chains"
+FAMILY = CASES / "closed_chains"
 ROUND = np.linspace(0.05, 2.0 * np.pi + 0.05, 50, endpoint=False)
-
-
-def closed_form(case: str) -> ModuleType:
-    spec = spec_from_file_location(case, FAMILY / case / "exact.py")
-    assert spec and spec.loader
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def test_the_bars_of_bricard_close_all_the_way_round() -> None:
     """At (0, 0, 1) with the last axis along -x, for every value of the coordinate; rates are derivatives."""
-    m = closed_form("bricard")
+    m = closed_form("closed_chains/bricard")
     place, R, omega, velocity = m.bars(ROUND)[-1]
     assert np.max(np.abs(place + R.apply(m.LINKS[-1]) - [0.0, 0.0, 1.0])) < 1e-14
     assert np.max(np.abs(R.apply([-1.0, 0.0, 0.0]) - [-1.0, 0.0, 0.0])) < 1e-14
@@ -39,7 +28,7 @@ def test_the_bars_of_bricard_close_all_the_way_round() -> None:
 
 
 def test_bricard_comes_back_after_a_period() -> None:
-    m = closed_form("bricard")
+    m = closed_form("closed_chains/bricard")
     period = 2.0 * np.pi * m.swing()[2]
     found = m.exact(np.array([0.0, period]))["marker:P3.position"]
     assert np.max(np.abs(found[1] - [1.0, -1.0, 1.0])) < 1e-12
@@ -47,7 +36,7 @@ def test_bricard_comes_back_after_a_period() -> None:
 
 
 def test_the_bars_of_bennett_close_all_the_way_round() -> None:
-    m = closed_form("bennett")
+    m = closed_form("closed_chains/bennett")
     (first, second, _), _ = m.angles(ROUND)
     assert np.ptp(np.tan(0.5 * first) * np.tan(0.5 * second)) < 1e-11
     place, R, omega, velocity = m.bars(ROUND)[-1]

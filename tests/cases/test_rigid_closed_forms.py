@@ -2,9 +2,6 @@
 motion and published equations against the stored references."""
 
 from collections.abc import Callable
-from importlib.util import module_from_spec, spec_from_file_location
-from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
@@ -15,8 +12,8 @@ from crosscheck.library.find import load_case
 from crosscheck.library.reference import load_reference
 from crosscheck.references.tops import ACROSS, ALONG, HEIGHT, MARKERS, MASS
 from flexmb.typing import Real
+from tests.cases.shipped import CASES, closed_form
 
-CASES = Path(__file__).parents[2] / "cases"
 G = 9.81
 RTOL = 1e-12
 # A thousand steps of this tolerance each, and no motion here multiplies errors: but for the falling top, see there.
@@ -28,14 +25,6 @@ EXACT = sorted(
     for path in CASES.glob("*/*/exact.py")
     if "flexible" not in load_case(path.parent).run.tags
 )
-
-
-def closed_form(case: str) -> ModuleType:
-    spec = spec_from_file_location(case, CASES / case / "exact.py")
-    assert spec and spec.loader
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def integrate(rate: Callable[[float, Real], Real], start: Real, times: Real) -> Real:

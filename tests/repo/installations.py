@@ -36,6 +36,14 @@ def install(commands: Path, archive: Path) -> None:
     subprocess.run([*pip, *alone, str(archive)], check=True, capture_output=True)
 
 
+def installed_apart(source: Path, folder: Path) -> Path:
+    """A folder below this one that holds what is installed of a source tree, and nothing else."""
+    site = folder / "site"
+    pip = [sys.executable, "-m", "pip", "install", "--no-deps", "--no-index", "--target", str(site)]
+    subprocess.run([*pip, str(built("wheel", source, folder / "wheel"))], check=True, capture_output=True)
+    return site
+
+
 def called(commands: Path, folder: Path, *words: str, path: Path | None = None) -> subprocess.CompletedProcess[str]:
     """An installed command, run in a folder as a user runs it; `path` stands before what is installed."""
     clean = {name: text for name, text in os.environ.items() if name not in ("PYTHONPATH", "FLEXMB_KERNELS")}

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.repo.installations import installed_apart
 from tests.repo.project import ROOT
 
 TEMPLATE = ROOT / "docs" / "engine-template"
@@ -16,13 +17,7 @@ TEMPLATE = ROOT / "docs" / "engine-template"
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder in which the template is installed."""
-    folder = tmp_path_factory.mktemp("template")
-    build = [sys.executable, "-m", "hatchling", "build", "--target", "wheel", "--directory", str(folder / "wheel")]
-    subprocess.run(build, cwd=TEMPLATE, check=True, capture_output=True)
-    (archive,) = (folder / "wheel").iterdir()
-    install = [sys.executable, "-m", "pip", "install", "--no-deps", "--no-index", "--target", str(folder / "site")]
-    subprocess.run([*install, str(archive)], check=True, capture_output=True)
-    return folder / "site"
+    return installed_apart(TEMPLATE, tmp_path_factory.mktemp("template"))
 
 
 def test_it_is_found_and_keeps_the_contract(installed: Path, tmp_path: Path) -> None:

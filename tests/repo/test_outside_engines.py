@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.repo.installations import installed_apart
 from tests.repo.project import ROOT
 from tests.repo.snippets import snippets
 
@@ -25,13 +26,7 @@ CASE = "pendulums/compound"
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder in which the distribution of both adapters is installed."""
-    folder = tmp_path_factory.mktemp("outside")
-    build = [sys.executable, "-m", "hatchling", "build", "--target", "wheel", "--directory", str(folder / "wheel")]
-    subprocess.run(build, cwd=SOURCES, check=True, capture_output=True)
-    (archive,) = (folder / "wheel").iterdir()
-    install = [sys.executable, "-m", "pip", "install", "--no-deps", "--no-index", "--target", str(folder / "site")]
-    subprocess.run([*install, str(archive)], check=True, capture_output=True)
-    return folder / "site"
+    return installed_apart(SOURCES, tmp_path_factory.mktemp("outside"))
 
 
 def crosscheck(installed: Path, folder: Path, *words: str) -> subprocess.CompletedProcess[str]:

@@ -4,20 +4,18 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
-from tests.repo import catalogue, threads
+from tests.repo import catalogue, examples, gallery, motions, threads
 from tests.repo.project import ROOT
 from tests.repo.snippets import PAGES
 
 
-def test_the_catalogue_is_what_the_generator_writes() -> None:
-    assert catalogue.PAGE.read_text(encoding="utf-8") == catalogue.page(), "run `python -m tests.repo.catalogue`"
-
-
-def test_the_page_of_what_threads_may_share_is_what_the_generator_writes() -> None:
-    assert threads.PAGE.read_text(encoding="utf-8") == threads.page(), "run `python -m tests.repo.threads`"
+@pytest.mark.parametrize("maker", [catalogue, examples, gallery, motions, threads], ids=lambda maker: maker.PAGE.name)
+def test_a_page_is_what_its_generator_writes(maker: ModuleType) -> None:
+    assert maker.PAGE.read_text(encoding="utf-8") == maker.page(), f"run `python -m {maker.__name__}`"
 
 
 def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:

@@ -16,7 +16,8 @@ from msgspec.structs import asdict, replace
 import flexmb
 from flexmb.scene.files import load_scene
 from flexmb.scene.schema import AngularCoordinate, Cylindrical, Scene
-from tests.cases.test_overconstrained import FAMILY, closed_form
+from tests.cases.shipped import closed_form
+from tests.cases.test_overconstrained import FAMILY
 
 # Settings, and the error (m) of markers that a run keeps to.
 SETTINGS = {
@@ -63,7 +64,7 @@ def bricard_course(m: ModuleType, rate: float, psi: np.ndarray) -> tuple[np.ndar
 @pytest.mark.parametrize("settings", SETTINGS)
 def test_bricard_goes_round(settings, slides):
     """A slide in one joint makes four or five independent rows, but for two places in every turn."""
-    m, (given, tolerance) = closed_form("bricard"), SETTINGS[settings]
+    m, (given, tolerance) = closed_form("closed_chains/bricard"), SETTINGS[settings]
     times, expected = bricard_course(m, -8.0, m.START - np.linspace(0.0, 4.0 * np.pi, 60))
     run = flexmb.simulate(with_slides(bricard_turning(m, -8.0), *slides), times[-1], samples=times, **given)
     assert run.finished, run.message
@@ -74,7 +75,7 @@ def test_bricard_goes_round(settings, slides):
 @pytest.mark.parametrize("settings", SETTINGS)
 def test_bennett_goes_round(settings, slides):
     """With three slides branches cross where all bars lie on one line."""
-    m, (given, tolerance) = closed_form("bennett"), SETTINGS[settings]
+    m, (given, tolerance) = closed_form("closed_chains/bennett"), SETTINGS[settings]
     times = np.linspace(0.0, 4.0, 41)
     scene = with_slides(load_scene(FAMILY / "bennett" / "scene.toml"), *slides)
     run = flexmb.simulate(scene, times[-1], samples=times, **given)
@@ -86,7 +87,7 @@ def test_bennett_goes_round(settings, slides):
 
 def test_bricard_itself_is_nowhere_singular():
     """The axes of its joints are of rank five all the way round, with room to spare."""
-    m = closed_form("bricard")
+    m = closed_form("closed_chains/bricard")
     psi = np.linspace(0.0, 2.0 * np.pi, 200)
     chain = m.bars(psi)
     axes = [R.apply(axis) for axis, (_, R, _, _) in zip(m.AXES, chain, strict=True)] + [np.tile([-1.0, 0, 0], (200, 1))]

@@ -121,50 +121,43 @@ def test_coordinates_that_are_left_out_are_zero():
     assert grid_nodes("m.bdf", "GRID,4\nGRID,5,,1.0\n").position == [[0.0] * 3, [1.0, 0.0, 0.0]]
 
 
-MESHES = {
-    "another system": ("m.bdf", "GRID,1,4,0.,0.,0.\n", "line 1: node 1 is in another coordinate system"),
-    "no coordinate": ("m.bdf", "GRID,1,,x,0.,0.\n", "line 1: GRID needs a number"),
-    "no grid": ("m.bdf", "CBAR,1,2\n", "there is no node in it"),
-    "instances": ("m.inp", "*INSTANCE, NAME=a\n", "line 1: .*write a flat input file"),
-    "cylindrical": ("m.inp", "*NODE, SYSTEM=C\n1, 0, 0, 0\n", "line 1: .*moves nodes"),
-    "no number": ("m.inp", "*NODE\n1, a, 0, 0\n", "line 2: a node is number, x, y, z"),
-    "too far": ("m.inp", "*NODE\n1, 1e300, 0, 0\n", "line 2: a node is number"),
-    "few": ("m.inp", "*NODE\n1, 0, 0, 0\n", "neither 3 nor 6 for each of 1 nodes"),
-}
-
-
-@pytest.mark.parametrize("fault", MESHES)
-def test_damaged_input_files_are_refused_with_line_and_remedy(fault, tmp_path):
-    name, text, words = MESHES[fault]
-    (tmp_path / name).write_text(text)
-    with pytest.raises(SuperElementError, match=words):
-        read_super_element(*written("mtx", tmp_path), tmp_path / name)
-
-
-BESIDE = {
-    "no dof": (None, "b.dof, which names its rows, is not beside it: ccx writes all three"),
-    "few": ("1.1\n", "it has 18 rows, and the file beside it names 1"),
-    "temperature": ("1.11\n", "line 1: 1 11 is not a node and one of its displacements"),
-    "twice": ("1.1\n1.1\n", "line 2: node 1 has displacement 1 twice"),
-}
+BESIDE = {  # by the matrices' kind: a file beside them with another text, or gone
+    "another system": ("mtx", "m.bdf", "GRID,1,4,0.,0.,0.\n", "line 1: node 1 is in another coordinate system"),
+    "no coordinate": ("mtx", "m.bdf", "GRID,1,,x,0.,0.\n", "line 1: GRID needs a number"),
+    "no grid": ("mtx", "m.bdf", "CBAR,1,2\n", "there is no node in it"),
+    "instances": ("mtx", "m.inp", "*INSTANCE, NAME=a\n", "line 1: .*write a flat input file"),
+    "cylindrical": ("mtx", "m.inp", "*NODE, SYSTEM=C\n1, 0, 0, 0\n", "line 1: .*moves nodes"),
+    "no number": ("mtx", "m.inp", "*NODE\n1, a, 0, 0\n", "line 2: a node is number, x, y, z"),
+    "too far": ("mtx", "m.inp", "*NODE\n1, 1e300, 0, 0\n", "line 2: a node is number"),
+    "few": ("mtx", "m.inp", "*NODE\n1, 0, 0, 0\n", "neither 3 nor 6 for each of 1 nodes"),
+    "no dof": ("calculix", "b.dof", None, "b.dof, which names its rows, is not beside it: ccx writes all three"),
+    "few rows": ("calculix", "b.dof", "1.1\n", "it has 18 rows, and the file beside it names 1"),
+    "temperature": ("calculix", "b.dof", "1.11\n", "line 1: 1 11 is not a node and one of its displacements"),
+    "a displacement twice": ("calculix", "b.dof", "1.1\n1.1\n", "line 2: node 1 has displacement 1 twice"),
+    "mapping": ("ansys", "K.mapping", " Matrix Eqn Node DOF\n 2 1 UX\n", "line 2: this is not row 1"),
+    "header": ("mtx", "nodes.csv", "x,y,z\n1,2,3\n", "line 1: the header"),
+    "empty": ("mtx", "nodes.csv", "id,x,y,z\n", "there is no node"),
+    "words": ("mtx", "nodes.csv", "id,x,y,z\n1,a,0,0\n", "line 2: give id,x,y,z as numbers"),
+    "nan": ("mtx", "nodes.csv", "id,x,y,z\n1,nan,0,0\n", "line 2: a coordinate"),
+    "dofs": ("mtx", "nodes.csv", "id,x,y,z,dofs\n1,0,0,0,127\n", 'node 1 has the dofs "127"'),
+    "few in a table": ("mtx", "nodes.csv", "id,x,y,z\n1,0,0,0\n", "K has 18 rows"),
+    "beyond all numbers": ("mtx", "nodes.csv", f"id,x,y,z\n{'9' * 30},0,0,0\n", "line 2: give id,x,y,z as numbers"),
+    "endless cell": ("mtx", "nodes.csv", f"id,x,y,z\n{'2' * 200_000},0,0,0\n", "field larger than"),
+    "a node twice": ("mtx", "nodes.csv", "id,x,y,z\n1,0,0,0\n1,1,0,0\n", "a node number is repeated"),
+    "a node of the matrices": (
+        "pch", "nodes.csv", "id,x,y,z\n1,0,0,0\n2,0.35,0,0\n", "rows of node 3, which the table of nodes does not list"
+    ),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("fault", BESIDE)
-def test_files_of_rows_that_do_not_fit_are_refused(fault, tmp_path):
-    text, words = BESIDE[fault]
-    K_file, M_file = written("calculix", tmp_path)
-    K_file.with_suffix(".dof").unlink() if text is None else K_file.with_suffix(".dof").write_text(text)
+def test_damaged_files_beside_matrices_are_refused_with_line_and_remedy(fault, tmp_path):
+    kind, name, text, words = BESIDE[fault]
+    given = written(kind, tmp_path)
     (tmp_path / "nodes.csv").write_text(NODES)
+    (tmp_path / name).unlink() if text is None else (tmp_path / name).write_text(text)
     with pytest.raises(SuperElementError, match=words):
-        read_super_element(K_file, M_file, tmp_path / "nodes.csv")
-
-
-def test_a_mapping_whose_rows_are_not_in_order_is_refused(tmp_path):
-    K_file, M_file = written("ansys", tmp_path)
-    K_file.with_suffix(".mapping").write_text(" Matrix Eqn Node DOF\n 2 1 UX\n")
-    (tmp_path / "nodes.csv").write_text(NODES)
-    with pytest.raises(SuperElementError, match="line 2: this is not row 1"):
-        read_super_element(K_file, M_file, tmp_path / "nodes.csv")
+        read_super_element(*given, tmp_path / (name if name.startswith("m.") else "nodes.csv"))
 
 
 def test_damaged_binary_op4_is_refused_wherever_it_is_cut():
@@ -249,30 +242,3 @@ def test_damaged_matrices_are_refused_with_file_and_remedy(fault, tmp_path):
     with pytest.raises(SuperElementError, match=words) as error:
         read_super_element(tmp_path / name, tmp_path / name, tmp_path / "nodes.csv")
     assert name in str(error.value)
-
-
-TABLES = {
-    "header": ("x,y,z\n1,2,3\n", "line 1: the header"),
-    "empty": ("id,x,y,z\n", "there is no node"),
-    "words": ("id,x,y,z\n1,a,0,0\n", "line 2: give id,x,y,z as numbers"),
-    "nan": ("id,x,y,z\n1,nan,0,0\n", "line 2: a coordinate"),
-    "dofs": ("id,x,y,z,dofs\n1,0,0,0,127\n", 'node 1 has the dofs "127"'),
-    "few": ("id,x,y,z\n1,0,0,0\n", "K has 18 rows"),
-    "beyond all numbers": (f"id,x,y,z\n{'9' * 30},0,0,0\n", "line 2: give id,x,y,z as numbers"),
-    "endless cell": (f"id,x,y,z\n{'2' * 200_000},0,0,0\n", "field larger than"),
-    "twice": ("id,x,y,z\n1,0,0,0\n1,1,0,0\n", "a node number is repeated"),
-}
-
-
-@pytest.mark.parametrize("fault", TABLES)
-def test_damaged_tables_are_refused_with_line_and_remedy(fault, tmp_path):
-    text, words = TABLES[fault]
-    (tmp_path / "nodes.csv").write_text(text)
-    with pytest.raises(SuperElementError, match=words):
-        read_super_element(*written("mtx", tmp_path), tmp_path / "nodes.csv")
-
-
-def test_nodes_of_a_punch_file_have_to_be_in_the_table(tmp_path):
-    (tmp_path / "nodes.csv").write_text("id,x,y,z\n1,0,0,0\n2,0.35,0,0\n")
-    with pytest.raises(SuperElementError, match="rows of node 3, which the table of nodes does not list"):
-        read_super_element(*written("pch", tmp_path), tmp_path / "nodes.csv")

@@ -255,8 +255,23 @@ def test_general_kernels_are_asked_for_by_one_thread_only():
         os.environ["FLEXMB_KERNELS"] = before or "general"
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no forks")
-@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+def forking(test: Callable[..., None]) -> Callable[..., None]:
+    warned = pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")(test)
+    return pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no forks")(warned)
+
+
+def ends_well(work: Callable[[], None], seconds: float = 20) -> bool:
+    """Whether a process that is forked off to do this ends in time and without a failure."""
+    child = multiprocessing.get_context("fork").Process(target=work)
+    child.start()
+    child.join(seconds)
+    if child.is_alive():
+        child.kill()
+        return False
+    return child.exitcode == 0
+
+
+@forking
 def test_a_process_that_is_forked_off_while_threads_work_goes_on():
     """It has none of these threads, and no lock of theirs is held there."""
     system, state = W.tree, W.state
@@ -284,8 +299,7 @@ def test_a_process_that_is_forked_off_while_threads_work_goes_on():
             thread.join()
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no forks")
-@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+@forking
 def test_a_process_that_is_forked_off_while_a_thread_compiles_can_compile():
     """It waits for the kernel, and does not inherit a lock that nobody there can release."""
     compiling, seconds = threading.Event(), 0.3
@@ -298,18 +312,12 @@ def test_a_process_that_is_forked_off_while_a_thread_compiles_can_compile():
     thread = threading.Thread(target=work)
     thread.start()
     compiling.wait()
-    child = multiprocessing.get_context("fork").Process(target=_compile_in_a_child)
-    child.start()
-    child.join(20)
-    hangs = child.is_alive()
-    if hangs:
-        child.kill()
+    well = ends_well(_compile_in_a_child)
     thread.join()
-    assert not hangs and child.exitcode == 0
+    assert well
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no forks")
-@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+@forking
 def test_a_process_that_is_forked_off_while_a_thread_finds_a_kept_value_finds_it_too():
     """For all that is kept in an object: the thread is inside the property, and is not there in the child."""
     finding, end = threading.Event(), threading.Event()
@@ -330,25 +338,19 @@ def test_a_process_that_is_forked_off_while_a_thread_finds_a_kept_value_finds_it
         end.set()
         sys.exit(Kept().value != 1)
 
-    child = multiprocessing.get_context("fork").Process(target=work)
-    child.start()
-    child.join(20)
-    hangs = child.is_alive()
-    if hangs:
-        child.kill()
+    well = ends_well(work)
     end.set()
     thread.join()
-    assert not hangs and child.exitcode == 0
+    assert well
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no forks")
+@forking
 def test_a_process_that_is_forked_off_while_threads_import_and_read_first_scenes():
     """Of a module that they were importing, the child would wait for the rest; and none of their calls crashes."""
     assert program("forked_while_importing").split()[:2] == ["0", "0"]
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no forks")
-@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+@forking
 def test_fifteen_processes_that_are_forked_off_while_threads_compile_scenes():
     """What threads find meanwhile is kept without locks, or forks wait for it: see `flexmb.kept`, `flexmb.forks`."""
     busy = threading.Event()
@@ -362,13 +364,7 @@ def test_fifteen_processes_that_are_forked_off_while_threads_compile_scenes():
         thread.start()
     try:
         for _ in range(15):
-            child = multiprocessing.get_context("fork").Process(target=_compile_and_evaluate)
-            child.start()
-            child.join(30)
-            hangs = child.is_alive()
-            if hangs:
-                child.kill()
-            assert not hangs and child.exitcode == 0
+            assert ends_well(_compile_and_evaluate, 30)
     finally:
         busy.set()
         for thread in threads:
