@@ -33,6 +33,7 @@ from crosscheck.engines.extremes import fault as fault_of_extremes
 from crosscheck.engines.extremes import has_extremes
 from crosscheck.engines.linear.outputs import fault as fault_of_linear
 from crosscheck.engines.linear.parts import DERIVATIVES, FREQUENCIES
+from crosscheck.engines.openness import ALL, AXES, LOAD_PARTS, Openness
 from crosscheck.engines.trajectories import first_samples
 from flexmb.run.channels import channels_of
 from flexmb.scene.connectors import BetweenNodes
@@ -40,7 +41,6 @@ from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
 RUNGS = 3
-LOAD_PARTS = {"torque": slice(0, 3), "force": slice(3, 6)}
 LONGEST_TEXT = 4000
 LARGEST_COUNT = 2**63 - 1  # what a record can hold
 UNIT = 8 * float(np.finfo(np.float32).eps)
@@ -232,22 +232,36 @@ def _finite_samples(run: Trajectory, finished: bool) -> int:
 
 
 def _undetermined(answer: Trajectory, scene: Scene) -> tuple[str, ...]:
-    """The names of undetermined channels, which must be loads or drives of the run.
+    """The names of undetermined components, which must be of loads or drives of the run.
 
     Only redundant closures leave loads undetermined, so on a tree the claim itself is a breach: it would hide its
     author's numbers, and take those of all other engines out of the comparison.
     """
     _instance(answer.undetermined, tuple, "undetermined")
-    there = {f"load:{name}.{part}" for name in answer.loads for part in LOAD_PARTS}
-    there |= {f"drive:{name}" for name in answer.drives}
+    there = {f"load:{name}.{part}": len(AXES) for name in answer.loads for part in LOAD_PARTS}
+    there |= {f"drive:{name}": values.shape[-1] for name, values in answer.drives.items() if np.ndim(values) == 2}
     for each in answer.undetermined:
-        right = isinstance(each, str) and each in there
-        _require(right, f"undetermined has {each!r:.80}: it names channels of loads and drives that the run has")
+        _require(
+            isinstance(each, str) and _names_some(each, there),
+            f"undetermined has {each!r:.80}: it names channels of loads and drives that the run has, or components of "
+            'theirs: "load:pin.force", "load:pin.force[y, z]", "drive:arm[2]"',
+        )
         _require(
             bool(scene.constraints),
             f"undetermined has {each!r:.80}: the scene has no closures or couplings: the motion determines its loads",
         )
-    return tuple(sorted(set(answer.undetermined)))
+    return Openness.of(answer.undetermined).names
+
+
+def _names_some(name: str, widths: Mapping[str, int]) -> bool:
+    """Whether it names a channel of so many columns, or some of them."""
+    try:
+        named = Openness.of((name,)).by_channel
+    except ValueError:
+        return False
+    return all(
+        channel in widths and (columns is ALL or max(columns) < widths[channel]) for channel, columns in named.items()
+    )
 
 
 def _events(answer: Any) -> tuple[tuple[str, float], ...]:
@@ -268,7 +282,8 @@ def _instant(t: Any) -> float:
 def _envelope(answer: Any, run: Trajectory) -> dict[str, Real]:
     """The envelope of a finished run, which contains the samples of each of its channels."""
     channels, checked = channels_of(run) if run.status == "finished" else {}, {}
-    known = {name for name in channels if has_extremes(name) and name not in run.undetermined}
+    is_open = Openness.of(run.undetermined)
+    known = {name for name in channels if has_extremes(name) and name not in is_open}
     for name, rows in _named_by(answer, "envelope", known):
         where = f"envelope[{name!r}]"
         _require(isinstance(rows, np.ndarray) and rows.ndim == 2, f"{where} is {_named(rows)} and not an array (5, k)")
@@ -280,10 +295,13 @@ def _envelope(answer: Any, run: Trajectory) -> dict[str, Real]:
 
 def _determined(run: Trajectory, output: str, name: str, values: Real) -> Real:
     """The columns of an output that the motion determines."""
-    if output == "loads":
-        known = [part for key, part in LOAD_PARTS.items() if f"load:{name}.{key}" not in run.undetermined]
-        return np.hstack([values[:, :0], *(values[:, part] for part in known)])
-    return values[:, :0] if output == "drives" and f"drive:{name}" in run.undetermined else values
+    if not run.undetermined or output not in ("loads", "drives"):
+        return values
+    is_open = Openness.of(run.undetermined)
+    if output == "drives":
+        return values[:, ~is_open.flags(f"drive:{name}", values.shape[1])]
+    flags = [is_open.flags(f"load:{name}.{part}", len(AXES)) for part in LOAD_PARTS]
+    return values[:, ~np.concatenate(flags)]
 
 
 def _signals(run: Trajectory) -> Iterator[tuple[str, Real]]:

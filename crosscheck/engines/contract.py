@@ -134,9 +134,10 @@ class Trajectory:
     (T,n*n) are those of the accelerations of the n free speeds at every sample, row by row in the order and by the
     displacements of `crosscheck.engines.linear.coordinates`; `frequencies` (T,n) rad/s as
     `crosscheck.engines.linear.frequencies` defines them; `known_to` (T,), by these names and "frequencies", says how
-    far (Frobenius norm) they may be from those of the same state in exact arithmetic. `undetermined`: the channels
-    "load:<name>.torque", "load:<name>.force" or "drive:<name>" that redundant closures leave undetermined; they may
-    hold NaN and are not compared. An engine that names one that the motion determines has failed; on a scene without
+    far (Frobenius norm) they may be from those of the same state in exact arithmetic. `undetermined`: what redundant
+    closures leave undetermined: channels "load:<name>.torque", "load:<name>.force", "drive:<name>", or components of
+    theirs, "load:<name>.force[y, z]" in World axes, "drive:<name>[2]" from 1. These may hold NaN, and no others may;
+    they are not compared. An engine that names a component that the motion determines has failed; on a scene without
     closures and couplings that is all of them. `events`: name and time (s) of what happened, in the order of time.
     `envelope`, only where the run asks for it: by channel the extremes over all of its steps and both sides of events,
     as rows of `crosscheck.engines.extremes`.

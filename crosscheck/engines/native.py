@@ -18,7 +18,6 @@ from importlib.metadata import PackageNotFoundError, version
 import numpy as np
 from msgspec import structs
 
-from crosscheck.engines.answers import LOAD_PARTS
 from crosscheck.engines.contract import (
     LINEAR,
     OUTPUTS,
@@ -33,6 +32,7 @@ from crosscheck.engines.contract import (
 )
 from crosscheck.engines.extremes import ROWS, has_extremes
 from crosscheck.engines.native_linear import linear_outputs
+from crosscheck.engines.openness import LOAD_PARTS, Openness
 from crosscheck.engines.pace import fastest_mode, pace
 from crosscheck.engines.steps import USUAL_S, ladder
 from crosscheck.engines.trajectories import first_samples
@@ -50,7 +50,7 @@ from flexmb.system.algorithms import ALGORITHMS
 from flexmb.system.compile import compile
 from flexmb.system.system import System
 from flexmb.system.watches import WAIVERS
-from flexmb.typing import Real
+from flexmb.typing import Flags, Real
 
 _TOLERANCES = (1e-6, 1e-8, 1e-10, 1e-12)
 _RUNGS = 4  # of steps
@@ -209,7 +209,7 @@ class NativeModel:
             **{name: getattr(done, name) for name in OUTPUTS if name not in LINEAR},
             wall_s=done.statistics.run_s,
             evaluations=done.statistics.evaluations,
-            undetermined=tuple(_undetermined(done)),
+            undetermined=Openness.of_flags(_undetermined(done)).names,
             events=tuple((event.name, event.t) for event in done.events),
         )
         trajectory = first_samples(
@@ -240,21 +240,21 @@ def _extremes(envelope: Envelope, run: Trajectory) -> dict[str, Real]:
         energy={kind: found[:, 0] for kind, found in energy.items()}, momentum=rows(envelope.momentum),
     )  # fmt: skip
     channels = channels_of(seen) | ({"energy.total": energy["total"]} if run.energy else {})
+    is_open = Openness.of(run.undetermined)
     return {
         name: np.hstack([values, *([rows(envelope.magnitudes[name])] if is_vector(name) else [])])
         for name, values in channels.items()
-        if has_extremes(name) and name not in run.undetermined
+        if has_extremes(name) and name not in is_open
     }
 
 
-def _undetermined(done: NativeTrajectory) -> Iterator[str]:
+def _undetermined(done: NativeTrajectory) -> Iterator[tuple[str, Flags]]:
+    """Channels of loads and drives with flags of their open components."""
     for name, is_open in done.undetermined.items():
         if name.endswith(".drive") and name not in done.loads:
-            yield f"drive:{name.removesuffix('.drive')}"
-            continue
-        for part, place in LOAD_PARTS.items():
-            if np.any(is_open[place]):
-                yield f"load:{name}.{part}"
+            yield f"drive:{name.removesuffix('.drive')}", is_open
+        else:
+            yield from ((f"load:{name}.{part}", is_open[place]) for part, place in LOAD_PARTS.items())
 
 
 def _approximation(scene: Scene, algorithm: Algorithm) -> str:

@@ -7,18 +7,19 @@ up to there and that of the reference. Goals and scales are those of the engine'
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from crosscheck.engines.openness import NOTHING_OPEN, Openness
 from crosscheck.judging.entries import coordinates_of, with_worst_entry
 from crosscheck.judging.finer_efforts import finer_efforts
 from crosscheck.judging.question import Question
 from crosscheck.judging.results import CaseResults, Result
 from crosscheck.judging.sizes import Sizes
 from crosscheck.judging.uncertainty import Uncertainty
-from crosscheck.judging.verdict import Finding, Signal, Verdict, compare, not_determined
+from crosscheck.judging.verdict import Finding, Signal, Verdict, compare, determined, not_determined, with_open
 from crosscheck.library.case import ComparisonSide
 from crosscheck.library.patterns import most_specific
 from crosscheck.library.reference import StoredReference
@@ -89,14 +90,14 @@ def hold(
     result: Result,
     reference: ReferenceSignals,
     asked: ReferenceGoals,
-    undetermined: Collection[str] = (),
+    undetermined: Openness = NOTHING_OPEN,
     like: Result | None = None,
     goal_of: Callable[[str, float], float] = lambda channel, goal: goal,
     coordinates: Sequence[str] = (),
 ) -> Iterator[tuple[str, float, Finding]]:
     """The finding on every channel of the reference that has a goal, with that goal. Never raises.
 
-    Channels that the motion leaves `undetermined` are not compared. `goal_of` replaces the goal of a channel.
+    Components that the motion leaves `undetermined` are not compared. `goal_of` replaces the goal of a channel.
     `coordinates` name the rows of derivatives. `like` is the result whose U is used: for a control that of the
     unmutated run. A kind of energy that the engine does not offer is left out; any other channel counts as refused. A
     result that did not finish has its status for each goal.
@@ -116,14 +117,15 @@ def hold(
         return
     for channel, pattern in named:
         goal = asked.goals[pattern]
-        if channel in undetermined:
+        if undetermined.is_whole(channel, reference.channels[channel].shape[1]):
             yield channel, goal, not_determined()
         elif channel in result.channels:
             scaled = most_specific(asked.scales, channel)
             scale = asked.scales[scaled] if scaled is not None else None
             own = at_samples(result.control_signal(channel, like or result, across=False), places)
-            stored = reference.signal(channel)
+            own, stored = (determined(channel, each, undetermined) for each in (own, reference.signal(channel)))
             verdict = compare(channel, own, stored, goal_of(channel, goal), scale)
+            verdict = with_open(verdict, channel, undetermined)
             apart = with_worst_entry(verdict, channel, own.values, stored.values, reference.times, coordinates)
             yield channel, goal, apart
         elif not channel.startswith("energy."):

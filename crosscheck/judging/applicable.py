@@ -13,17 +13,19 @@ from typing import Literal, assert_never
 
 from crosscheck.judging.against_reference import REFERENCE
 from crosscheck.judging.results import CaseResults, Result
-from crosscheck.judging.verdict import Verdict
+from crosscheck.judging.verdict import NOT_DETERMINED, Verdict
 from crosscheck.library.patterns import most_specific
 from flexmb.run.channels import matches
 
-Kind = Literal["refused", "not offered", "not determined"]
-"""The engine refuses the scene; it lacks the channel; the motion of the scene does not determine the channel."""
+Kind = Literal["refused", "not offered", "not determined", "partly determined"]
+"""The engine refuses the scene; it lacks the channel; the motion of the scene determines none of the channel's
+components, or not all of them."""
 
 
 @dataclass(frozen=True)
 class Inapplicable:
-    """What has no verdict, with the `reason`; `channel` is "" where the engine refused the whole variant."""
+    """What has no verdict, with the `reason`. `channel` is "" where the engine refused the whole variant, and
+    "load:pin.force[y, z]" where some components of one have no verdict."""
 
     case: str
     variant: str
@@ -38,7 +40,7 @@ class Inapplicable:
         match self.kind:
             case "refused" | "not offered":
                 return True
-            case "not determined":
+            case "not determined" | "partly determined":
                 return False
             case _:
                 assert_never(self.kind)
@@ -57,10 +59,14 @@ def set_apart(case: CaseResults, verdicts: Iterable[Verdict]) -> tuple[list[Verd
     counting: list[Verdict] = []
     for verdict in verdicts:
         open_ = case.undetermined(verdict.variant_a, verdict.variant_b)
-        if verdict.status == "refused" and verdict.channel in open_:
+        whole = verdict.status == "refused" and verdict.reason == NOT_DETERMINED
+        if whole or (verdict.channel in open_ and verdict.E is not None):
+            kind: Kind = "not determined" if whole else "partly determined"
+            named = verdict.channel if whole else open_.name(verdict.channel)
             for variant, engine in dict.fromkeys(verdict.sides):
-                apart = Inapplicable(case.case.case, variant, engine, verdict.channel, verdict.reason, "not determined")
+                apart = Inapplicable(case.case.case, variant, engine, named, NOT_DETERMINED, kind)
                 absences |= {apart: None} if engine != REFERENCE else {}
+        if whole:
             continue
         refusing = _refusing(case, verdict)
         if verdict.ok or not refusing or any(result.engine not in joined for result in refusing):

@@ -13,7 +13,16 @@ from crosscheck.judging.entries import coordinates_of, with_worst_entry
 from crosscheck.judging.finer_efforts import finer_efforts
 from crosscheck.judging.question import Question
 from crosscheck.judging.results import CaseResults, Result
-from crosscheck.judging.verdict import SEVERITY, Finding, Verdict, compare, conserve, not_determined
+from crosscheck.judging.verdict import (
+    SEVERITY,
+    Finding,
+    Verdict,
+    compare,
+    conserve,
+    determined,
+    not_determined,
+    with_open,
+)
 from crosscheck.library.accepted import key
 from crosscheck.library.case import Band, Comparison, ComparisonSide, Conservation, Control
 from crosscheck.library.channels import CONSERVED
@@ -42,13 +51,13 @@ def _comparison(case: CaseResults, item: Comparison) -> Iterator[Verdict]:
     a, b = (case.get(side.variant, side.engine) for side in item.sides)
     stands_on = basis(case.case.variants, (a, b), item.scales)
     question = Question(case.case, item.name, "comparison", *item.sides, item.expect, item.reason, stands_on)
-    across = question.a.variant != question.b.variant
+    across, is_open = question.a.variant != question.b.variant, case.undetermined(a.variant, b.variant)
     for channel, goal, finding in _channels(item.goals, a, b, case):
         wanted = question.goal(channel, goal)
         if finding is None:
             scale = _scale(item.scales, channel)
-            one, other = a.signal(channel, across), b.signal(channel, across)
-            finding = compare(channel, one, other, wanted, scale)
+            one, other = (determined(channel, side.signal(channel, across), is_open) for side in (a, b))
+            finding = with_open(compare(channel, one, other, wanted, scale), channel, is_open)
             names = coordinates_of(case.case.variants.get(a.variant))
             finding = with_worst_entry(finding, channel, one.values, other.values, a.times, names)
             finding = _with_surrogates(finding, a, b)
@@ -73,7 +82,7 @@ def _unused(
     goals: Iterable[str], given: Mapping[str, Iterable[str]], a: Result, b: Result, case: CaseResults
 ) -> Iterator[tuple[str, Finding]]:
     """Scales and bands whose pattern names no judged channel: a misspelt pattern must not be ignored silently."""
-    there = _union(_union(a.channels, b.channels), case.undetermined(a.variant, b.variant))
+    there = _union(_union(a.channels, b.channels), tuple(case.undetermined(a.variant, b.variant).by_channel))
     judged = [name for name in there if most_specific(goals, name) is not None]
     for what, patterns in given.items():
         for pattern in patterns if judged else ():
@@ -101,13 +110,14 @@ def _control(case: CaseResults, item: Control) -> Iterator[Verdict]:
     question = Question(case.case, item.name, "control", item.a, item.b, "differ", why)
     faulty = case.get(item.a.variant, item.a.engine, f"control:{item.name}")
     twin, b = case.get(item.a.variant, item.a.engine), case.get(item.b.variant, item.b.engine)
-    across = item.a.variant != item.b.variant
+    across, is_open = item.a.variant != item.b.variant, faulty.open | b.open
     for channel, goal, finding in _channels(item.goals, faulty, b, case):
         if finding is None:
             finding = _absent(twin, channel)
         if finding is None:
-            signal, other = faulty.control_signal(channel, twin, across), b.signal(channel, across)
-            finding = compare(channel, signal, other, goal, _scale(item.scales, channel))
+            signals = faulty.control_signal(channel, twin, across), b.signal(channel, across)
+            signal, other = (determined(channel, each, is_open) for each in signals)
+            finding = with_open(compare(channel, signal, other, goal, _scale(item.scales, channel)), channel, is_open)
             names = coordinates_of(case.case.variants.get(b.variant))
             finding = with_worst_entry(finding, channel, signal.values, other.values, b.times, names)
         yield question.verdict(channel, goal, finding)
@@ -159,8 +169,8 @@ def _channels(
     """Every channel to judge, with its goal, and with the finding if there is nothing to compare.
 
     If a result is missing, the pattern itself stands for its channels. A kind of energy that only one engine offers is
-    left out; any other channel that only one offers is a refusal of the other. Channels that the motion does not
-    determine are not compared.
+    left out; any other channel that only one offers is a refusal of the other. Channels of which the motion determines
+    no component are not compared.
     """
     missing = _missing(a, b) or _elsewhere(a, b)
     undetermined = case.undetermined(a.variant, b.variant)
@@ -168,7 +178,7 @@ def _channels(
         if missing is not None:
             yield pattern, goal, missing
             continue
-        there = _union(_union(a.channels, b.channels), undetermined)
+        there = _union(_union(a.channels, b.channels), tuple(undetermined.by_channel))
         offered = [name for name in there if _belongs(name, pattern, goals)]
         if pattern not in offered:
             shared = set(a.channels) & set(b.channels)
@@ -176,10 +186,15 @@ def _channels(
         if not offered:
             yield pattern, goal, Finding("did not run", _without(pattern, goals, a, b))
         for name in offered:
-            if name in undetermined:
+            if undetermined.is_whole(name, _width(name, a, b)):
                 yield name, goal, not_determined()
             else:
                 yield name, goal, _absent(a, name) or _absent(b, name)
+
+
+def _width(channel: str, *results: Result) -> int | None:
+    """The number of components of a channel, None if no result has it."""
+    return next((result.values(channel).shape[1] for result in results if channel in result.channels), None)
 
 
 def _without(pattern: str, goals: Iterable[str], *results: Result) -> str:

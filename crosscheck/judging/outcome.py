@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from crosscheck.engines.registry import BUILT_IN
-from crosscheck.judging.applicable import Inapplicable, set_apart
+from crosscheck.judging.applicable import Inapplicable, Kind, set_apart
 from crosscheck.judging.case_verdicts import judge
 from crosscheck.judging.figures import recordable
 from crosscheck.judging.results import CaseResults, Session
@@ -113,8 +113,17 @@ class SessionOutcome:
     @property
     def undetermined(self) -> int:
         """The number of channels, by case and variant, that would be judged and that the motion does not determine."""
-        open_ = (absence for absence in self.inapplicable if absence.kind == "not determined")
-        return len({(absence.case, absence.variant, absence.channel) for absence in open_})
+        return self._number_of("not determined")
+
+    @property
+    def partly_determined(self) -> int:
+        """The number of channels, by case and variant, that are judged in some components only, as the motion does not
+        determine the others."""
+        return self._number_of("partly determined")
+
+    def _number_of(self, kind: Kind) -> int:
+        alike = (absence for absence in self.inapplicable if absence.kind == kind)
+        return len({(absence.case, absence.variant, absence.channel) for absence in alike})
 
     @property
     def unaccounted(self) -> list[Unjudged]:
@@ -231,8 +240,10 @@ class SessionOutcome:
     def _unoffered(self) -> str:
         told = [f"{engine} {count} channel{'s' if count > 1 else ''}" for engine, count in self.not_offered.items()]
         offered = f"; not offered and not judged: {', '.join(told)}" if told else ""
-        channels = f"{self.undetermined} channel{'s' if self.undetermined > 1 else ''}"
-        return offered + (f"; not determined and not judged: {channels}" if self.undetermined else "")
+        whole, parts = (f"{n} channel{'s' if n > 1 else ''}" for n in (self.undetermined, self.partly_determined))
+        not_judged = [whole] if self.undetermined else []
+        not_judged += [f"components of {parts}"] if self.partly_determined else []
+        return offered + (f"; not determined and not judged: {', '.join(not_judged)}" if not_judged else "")
 
     @property
     def _broken(self) -> str:

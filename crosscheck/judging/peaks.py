@@ -64,7 +64,7 @@ def has_envelopes(case: CaseResults) -> bool:
 
 def peaks(case: CaseResults, kinds: Collection[str] | None = None) -> Iterator[PeakOfChannel]:
     """Those of the finished main runs, by variant and engine in the order of the case; of all kinds of channels or of
-    some."""
+    some. Channels with components that the motion does not determine have none, as no magnitude is known."""
     for variant in case.case.run.variants:
         for engine in variant.engines:
             result = case.get(variant.name, engine)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 
 import msgspec
 import numpy as np
 
+from crosscheck.engines.openness import NOTHING_OPEN, Openness
 from crosscheck.judging.sizes import Sizes
 from crosscheck.judging.uncertainty import RUNGS, RungSignal, Uncertainty, at_rest, estimate, spatial, unknown
 from crosscheck.judging.verdict import Ending, Signal
@@ -29,7 +31,8 @@ class Result:
     """The runs of one ladder, coarse to fine. `status` and `message` are those of the finest effort.
 
     `refined` is the same engine's result with the finer spatial discretisation, finished or not, where the variant
-    asks for one. `reached_s` is the last sample time of a run that diverged.
+    asks for one. `reached_s` is the last sample time of a run that diverged. `open` are the components that its motion
+    leaves open: they are numbers of one engine's choice, and part of no value here.
     """
 
     variant: str
@@ -40,7 +43,9 @@ class Result:
     reached_s: float | None = None
     refined: Result | None = None
     refinement: tuple[float, float] = (2.0, 2.0)
+    open: Openness = NOTHING_OPEN
     _unpacked: dict[int, Real] = field(default_factory=dict, repr=False)
+    _determined: dict[int, Real] = field(default_factory=dict, repr=False)
     _estimates: dict[str, Uncertainty] = field(default_factory=dict, repr=False)
 
     @kept
@@ -56,14 +61,25 @@ class Result:
         return tuple(filter(is_judged, self.finest.channels)) if self.status == "finished" else ()
 
     @property
+    def determined_channels(self) -> tuple[str, ...]:
+        """The channels without open components."""
+        return tuple(channel for channel in self.channels if channel not in self.open)
+
+    @property
     def times(self) -> Real:
         """Sample times of the finest run (s)."""
         assert self.finest.times is not None
         return self._array(self.finest.times)
 
     def values(self, channel: str, run: RunRecord | None = None) -> Real:
-        """A channel (T, k) of the finest run, or of another run of the ladder."""
-        return self._array((run or self.finest).channels[channel])
+        """A channel (T, k) of the finest run, or of another run of the ladder, projected on its determined components:
+        the open ones are 0, and so take part in no distance and no size."""
+        packed = (run or self.finest).channels[channel]
+        if channel not in self.open:
+            return self._array(packed)
+        if id(packed) not in self._determined:
+            self._determined[id(packed)] = self.open.filled(channel, self._array(packed), 0.0)
+        return self._determined[id(packed)]
 
     @property
     def ending(self) -> Ending:
@@ -155,6 +171,8 @@ class Result:
             return f"{_past(refined.status)}: {refined.message}"
         if channel not in refined.channels:
             return "does not offer the channel"
+        if channel in refined.open.beyond(self.open):
+            return f"leaves components of it open, {refined.open.name(channel)}, that are determined here"
         if _same(self.finest, refined.finest):
             return "gave the very same result: it is not refined"
         return ""
@@ -187,12 +205,16 @@ class CaseResults:
         """A result; one that was never recorded "did not run"."""
         return self.results.get((variant, engine, role)) or _never_recorded(variant, engine)
 
-    def undetermined(self, *variants: str) -> tuple[str, ...]:
-        """Channels that the motion of any of these variants does not determine: the values of an engine are one choice
-        of infinitely many. They were found from the scenes; what engines say changes nothing here."""
-        infos = [self.case.variants[name] for name in variants if name in self.case.variants]
-        found = [info.undetermined for info in infos if not isinstance(info.undetermined, msgspec.UnsetType)]
-        return tuple(dict.fromkeys(channel for channels in found for channel in channels))
+    def undetermined(self, *variants: str) -> Openness:
+        """Components that the motion of any of these variants does not determine: what an engine gives is one choice of
+        infinitely many. They were found from the scenes; what engines say changes nothing here."""
+        return _of_variants(self.case, variants)
+
+
+def _of_variants(case: CaseRecord, variants: Iterable[str]) -> Openness:
+    infos = [case.variants[name] for name in variants if name in case.variants]
+    found = [info.undetermined for info in infos if not isinstance(info.undetermined, msgspec.UnsetType)]
+    return Openness.of(chain.from_iterable(found))
 
 
 @dataclass(frozen=True)
@@ -233,6 +255,9 @@ def _case_results(case: CaseRecord, runs: Iterable[RunRecord]) -> CaseResults:
         if not run.effort or ladder is None or run.role == FILM or _on(ladder, run):  # a film climbs no ladder
             groups.setdefault((run.variant, run.engine, run.role), []).append(run)
     results = {key: _result(key, group, _contrary_claim(case, key, group)) for key, group in groups.items()}
+    for (name, _, role), result in results.items():
+        claims = () if role == "main" else chain.from_iterable(run.undetermined for run in result.runs)
+        result.open = _of_variants(case, (name,)) | Openness.of(claims)
     for variant in case.run.variants:
         if variant.refined is None:
             continue
@@ -254,14 +279,12 @@ def _contrary_claim(case: CaseRecord, key: Key, group: Iterable[RunRecord]) -> s
     """
     variant, _, role = key
     info = case.variants.get(variant)
-    if role != "main" or info is None:
-        return ""
-    named = dict.fromkeys(channel for run in group for channel in run.undetermined)
-    if not named:
+    named = Openness.of(chain.from_iterable(run.undetermined for run in group))
+    if role != "main" or info is None or not named:
         return ""
     if isinstance(info.undetermined, msgspec.UnsetType):
-        return f"undetermined has {next(iter(named))!r}, which this older record cannot show: run the case again"
-    contrary = [channel for channel in named if channel not in info.undetermined]
+        return f"undetermined has {named.names[0]!r}, which this older record cannot show: run the case again"
+    contrary = named.beyond(Openness.of(info.undetermined)).names
     return f"undetermined has {contrary[0]!r:.80}: the motion of the scene determines it" if contrary else ""
 
 

@@ -19,7 +19,7 @@ from crosscheck.judging.against_reference import ReferenceSignals, at_samples, o
 from crosscheck.judging.applicable import Inapplicable
 from crosscheck.judging.results import CaseResults, Result
 from crosscheck.judging.sizes import size_of
-from crosscheck.judging.verdict import WHOLE_RANGE, Signal, Status, Verdict, compare
+from crosscheck.judging.verdict import WHOLE_RANGE, Signal, Status, Verdict, compare, determined
 from crosscheck.library.case import Comparison
 from crosscheck.library.patterns import most_specific
 from crosscheck.library.selection import expected_otherwise
@@ -104,7 +104,8 @@ def unjudged(
         left.open(result, channel)
         for result in results
         for channel in result.channels
-        if (result.variant, result.engine, channel) not in told and channel not in case.undetermined(result.variant)
+        if (result.variant, result.engine, channel) not in told
+        and not result.open.is_whole(channel, result.values(channel).shape[1])
     )
 
 
@@ -178,7 +179,8 @@ class _Left:
         if recorded is not None and stored is not None:
             places = shared_times(stored.times, result.times)
             if recorded.variant == result.variant and channel in stored.channels and places is not None:
-                yield "the reference", at_samples(own, places), stored.signal(channel)
+                given = determined(channel, stored.signal(channel), result.open)
+                yield "the reference", at_samples(own, places), given
         for engine in self.case.case.run.variant(result.variant).engines:
             other = self.case.get(result.variant, engine)
             named = engine not in self.case.case.joined

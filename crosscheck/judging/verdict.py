@@ -16,13 +16,14 @@ Conditions therefore test whether a requirement holds, never whether it fails: e
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import zip_longest
 from typing import Literal, get_args
 
 import msgspec
 import numpy as np
 
+from crosscheck.engines.openness import Openness
 from crosscheck.judging.sizes import size_of
 from crosscheck.judging.uncertainty import Uncertainty
 from crosscheck.library.accepted import Figure
@@ -47,6 +48,7 @@ SEVERITY: tuple[Status, ...] = (
     "did not run", "crashed", "did not finish", "failed", "diverged", "refused", "differ", "unresolved", "agree",
 )  # fmt: skip
 NEVER_EXPECTED = ("did not finish", "crashed", "did not run")
+NOT_DETERMINED = "not determined: closures are redundant, and infinitely many loads go with the same motion"
 WORSE = "worse than recorded"
 STALE = "stale figure ({}; accept anew by crosscheck run {} --accept)"
 WHOLE_RANGE = 1.0  # the largest goal
@@ -178,8 +180,19 @@ def compare(channel: str, a: Signal, b: Signal, goal: float, scale: float | None
 
 def not_determined() -> Finding:
     """The finding on a channel that the motion of the scene does not determine; it is not compared."""
-    why = "closures are redundant, and infinitely many loads go with the same motion"
-    return Finding("refused", f"not determined: {why}")
+    return Finding("refused", NOT_DETERMINED)
+
+
+def determined(channel: str, signal: Signal, is_open: Openness) -> Signal:
+    """A signal projected on the components that are not open: the others are 0, as `Result.values` has them."""
+    return replace(signal, values=is_open.filled(channel, signal.values, 0.0)) if channel in is_open else signal
+
+
+def with_open(finding: Finding, channel: str, is_open: Openness) -> Finding:
+    """The finding on the determined components of a channel, whose reason names the others."""
+    if channel not in is_open or finding.E is None:
+        return finding
+    return replace(finding, reason=f"{finding.reason}; {is_open.components(channel)} not determined and not compared")
 
 
 def conserve(drift: Real, scale: float, limit: float) -> Finding:

@@ -33,12 +33,12 @@ class ByReference:
 
     @kept
     def trusted(self) -> frozenset[str]:
-        verdicts = hold(self.true, self.reference, self.asked)
+        verdicts = hold(self.true, self.reference, self.asked, self.true.open)
         return frozenset(name for name, _, finding in verdicts if finding.status == "agree")
 
     def of_scene(self, faulty: Result) -> dict[str, ShownIn]:
         """The findings on the run of a faulty scene by channel, or by pattern if it did not finish."""
-        verdicts = hold(faulty, self.reference, self.asked, like=self.true)
+        verdicts = hold(faulty, self.reference, self.asked, self.true.open, like=self.true)
         return {
             name: ShownIn(status=finding.status, E=finding.E, U=finding.U, goal=goal)
             for name, goal, finding in verdicts

@@ -168,7 +168,7 @@ def _answers(what: JudgedVariant, true: Result, stored: ByReference | None) -> t
 def _rounding(true: Result) -> dict[str, float]:
     """The rounding (SI) of each family of channels, by which body and World components of an axis may differ."""
     sizes: dict[str, float] = {}
-    for name in true.channels:
+    for name in true.determined_channels:
         values = true.values(name)
         sizes[family(name)] = max(sizes.get(family(name), 0.0), magnitude(name, values))
     sums = max(true.finest.evaluations, len(true.times))
@@ -177,7 +177,7 @@ def _rounding(true: Result) -> dict[str, float]:
 
 def _falsified(true: Result, scene: Scene, fault: AnswerFault, rounding: dict[str, float]) -> dict[str, Real]:
     """The channels (T, k) with the fault, those that it changes by more than their rounding."""
-    right = {name: true.values(name) for name in true.channels}
+    right = {name: true.values(name) for name in true.determined_channels}
     wrong = signals_of(fault.falsify(run_of(true.times, right), scene))
     return {
         name: values

@@ -230,7 +230,8 @@ def _run(run: RunRecord, other: Result, counterpart: Counterpart) -> RunRecord:
     if run.times is None or set(run.channels) != set(other.finest.channels):
         return msgspec.structs.replace(run, channels={})
     times = (unpack(run.times) - counterpart.starts_s) / counterpart.clock
-    channels = counterpart.told(times, {name: unpack(packed) for name, packed in run.channels.items()})
+    determined = {name: packed for name, packed in run.channels.items() if name not in other.open}
+    channels = counterpart.told(times, {name: unpack(packed) for name, packed in determined.items()})
     return msgspec.structs.replace(
         run,
         times=pack(times),

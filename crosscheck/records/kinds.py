@@ -101,9 +101,10 @@ class VariantInfo(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     `drawing` uses the markers of every run, `film` those of a run made for the animation. `basis` identifies scene,
     transformation and sample times as given in the case's files ("" in older records). `coordinates` are the names of
-    those by which derivatives are given, where the variant asks for them. `undetermined` are the channels that the
-    motion does not determine, as follows from the scene (`crosscheck.running.undetermined`), whatever engines say;
-    older records do not say.
+    those by which derivatives are given, where the variant asks for them. `undetermined` names the components that the
+    motion does not determine (`crosscheck.engines.openness`), as follows from the scene
+    (`crosscheck.running.undetermined`), whatever engines say. Records of earlier versions name whole channels, or say
+    nothing.
     """
 
     level: str
@@ -148,7 +149,8 @@ class RunRecord(_OneRecord, frozen=True, kw_only=True, tag="run"):
 
     `status`: "finished"; "diverged", by the engine's statement; "failed" if the adapter raised or broke the contract;
     "crashed" if its process died; "did not finish" within its limits of time and memory; "refused"; "did not run".
-    `undetermined` are channels that the motion does not determine, as the engine says; they are not stored. `events`
+    `undetermined` names components that the motion does not determine, as the engine says: they are stored as NaN, and
+    channels that have no others are not stored (of earlier versions, whole channels). `events`
     are names and times (s) of what happened in the run. `envelope`, of the role "envelope", are extremes by channel, as
     rows of `crosscheck.engines.extremes`.
     """

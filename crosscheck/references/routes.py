@@ -145,6 +145,7 @@ def _of_engine(case: Case, route: ReferenceRoute, result: Result) -> RouteSignal
         what = f"{result.variant}, {result.engine}, {result.status}: {result.message}"
         raise CaseError(f"{case.folder / 'run.toml'}: [reference] {what}: correct the route, or take another")
     efforts = [run.effort for run in result.runs if run.effort_method == result.finest.effort_method]
+    given = [name for name in result.determined_channels if _given(route, name)]
     return RouteSignals(
         name=result.engine,
         title=basis.title(result.engine, ", ".join(efforts), route.witness),
@@ -152,8 +153,8 @@ def _of_engine(case: Case, route: ReferenceRoute, result: Result) -> RouteSignal
         method=result.finest.effort_method,
         made_with=_version(result.finest),
         times=result.times,
-        channels={name: result.values(name) for name in result.channels if _given(route, name)},
-        uncertainties={name: result.doubt(name, across=True) for name in result.channels if _given(route, name)},
+        channels={name: result.values(name) for name in given},
+        uncertainties={name: result.doubt(name, across=True) for name in given},
         witness=route.witness,
     )
 

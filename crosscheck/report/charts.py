@@ -65,8 +65,14 @@ def _drawn(case: CaseResults, verdict: Verdict) -> list[str]:
     """Channels to draw for a verdict: its own, or those of its pattern if the run did not finish."""
     if verdict.E is not None:
         return [verdict.channel]
-    stored = [name for result in _sides(case, verdict) if result.runs for name in result.finest.channels]
-    return [name for name in dict.fromkeys(stored) if matches(verdict.channel, name)]
+    results = [result for result in _sides(case, verdict) if result.runs]
+    is_open = case.undetermined(verdict.variant_a, verdict.variant_b)
+    stored = {name: packed.shape[1] for result in results for name, packed in result.finest.channels.items()}
+    return [
+        name
+        for name, width in stored.items()
+        if matches(verdict.channel, name) and not is_open.is_whole(name, width)
+    ]
 
 
 def _sides(case: CaseResults, verdict: Verdict) -> tuple[Result, Result]:
@@ -81,30 +87,34 @@ def _first(views: list[dict[str, Any]]) -> int:
 
 
 def _channel(store: Store, case: CaseResults, channel: str, pairs: list[Verdict]) -> dict[str, Any]:
-    """All sides of a channel, and for each judged pair distance and uncertainty over time (SI)."""
+    """All sides of a channel in its determined components, and for each judged pair distance and uncertainty over time
+    (SI)."""
     sides: dict[tuple[str, str], Result] = {}
     for verdict in pairs:
         for result in _sides(case, verdict):
             if result.runs and channel in result.finest.channels:
                 sides[result.variant, result.engine] = result
     several = len({variant for variant, _ in sides}) > 1
-    width = _shown(channel, next(iter(sides.values())).values(channel)).shape[1]
+    width = next(iter(sides.values())).values(channel).shape[1]
+    drawn = ~case.undetermined(*(variant for variant, _ in sides)).flags(channel, width)
+    names = COMPONENTS.get(width, [str(i + 1) for i in range(width)])
+    curves = {key: _shown(channel, result.values(channel)[:, drawn]) for key, result in sides.items()}
     return {
         "name": channel,
         "unit": unit(channel),
-        "components": ["norm"] if channel in SYMBOL else COMPONENTS.get(width, [str(i + 1) for i in range(width)]),
+        "components": ["norm"] if channel in SYMBOL else [names[i] for i in np.flatnonzero(drawn)],
         "size": min(signal_range(channel, result.values(channel)) for result in sides.values()),
         "magnitude": max(magnitude(channel, result.values(channel)) for result in sides.values()),
         "events": sorted({t for result in sides.values() for _, t in result.finest.events}),
-        "range": _shown_range([_shown(channel, result.values(channel)) for result in sides.values()]),
+        "range": _shown_range(list(curves.values())),
         "sides": [
             {
                 "label": _label(result, several),
                 "engine": result.engine,
                 "times": store.times(result.times),
-                "values": store.samples(_shown(channel, result.values(channel))),
+                "values": store.samples(curves[key]),
             }
-            for result in sides.values()
+            for key, result in sides.items()
         ],
         "pairs": [_pair(store, case, channel, verdict) for verdict in pairs if verdict.E is not None],
     }

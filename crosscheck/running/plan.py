@@ -259,12 +259,12 @@ def _info(case: Case, variant: Variant, scene: Scene | None, error: str) -> Vari
 
 
 def _undetermined(scene: Scene, t_end: float) -> tuple[str, ...]:
-    """Channels of loads that the motion of a scene leaves open: none of a tree."""
+    """Names of the components of loads that the motion of a scene leaves open: none of a tree."""
     if not scene.constraints:
         return ()
     from crosscheck.running.undetermined import undetermined  # loads the compiler
 
-    return undetermined(scene, t_end)
+    return undetermined(scene, t_end).names
 
 
 def scene_basis(case: Case, variant: Variant) -> str:

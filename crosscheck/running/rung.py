@@ -12,6 +12,7 @@ import numpy as np
 
 from crosscheck.engines.answers import BrokenContract, describe
 from crosscheck.engines.contract import Effort, Model, Run, Trajectory
+from crosscheck.engines.openness import Openness
 from crosscheck.engines.signals import signals_of
 from crosscheck.records.kinds import ENVELOPE, RunRecord
 from crosscheck.running.job import MAIN, Job
@@ -85,10 +86,13 @@ def _require_the_same(first: Trajectory, again: Trajectory) -> None:
         raise BrokenContract(f"not reproducible: the same effort finished once and {again.status} the next time")
     others = _determined(again)
     for name, values in _determined(first).items():
-        if name not in others or not np.array_equal(values, others[name]):
+        if name not in others or not np.array_equal(values, others[name], equal_nan=True):
             raise BrokenContract(f"not reproducible: {name} differs when the same effort is run again")
 
 
 def _determined(run: Trajectory) -> dict[str, Real]:
-    """All channels (T, k) of a run, without those that the motion leaves undetermined."""
-    return {name: values for name, values in signals_of(run).items() if name not in run.undetermined}
+    """All channels (T, k) of a run, NaN in the components that the engine calls undetermined; channels of which nothing
+    is left are not there."""
+    is_open = Openness.of(run.undetermined)
+    channels = ((name, is_open.filled(name, values, np.nan)) for name, values in signals_of(run).items())
+    return {name: values for name, values in channels if not is_open.is_whole(name, values.shape[1])}

@@ -1,4 +1,4 @@
-"""Channels of loads that the motion of a scene does not determine, found from its closures, whatever engines say.
+"""Components of loads that the motion of a scene does not determine, found from its closures, whatever engines say.
 
 The motion of flexmb gives the states; what is open there follows from the rank of the closures' rows by the dense route
 (`flexmb.dense.closures`), which shares no dynamics with flexmb's algorithms.
@@ -6,13 +6,15 @@ The motion of flexmb gives the states; what is open there follows from the rank 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from itertools import chain
 from typing import assert_never
 
 import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
+from crosscheck.engines.openness import LOAD_PARTS, Openness
 from flexmb.closure.closures import ClosureError
 from flexmb.dense import DenseSystem
 from flexmb.dense.closures import open_loads
@@ -27,42 +29,41 @@ from flexmb.system.system import System
 from flexmb.system.watches import WAIVERS
 from flexmb.tables.features import asking
 from flexmb.tables.state import State
+from flexmb.typing import Flags
 
 PLACES = 12  # in a run: what is open depends on the position, but is the same nearly everywhere
-PARTS = ("torque", slice(0, 3)), ("force", slice(3, 6))
 STEPS = 100_000  # of the run that gives the states: one that needs more is judged by what it reached
 Held = NDArray[np.bool_]
 
 
-def undetermined(scene: Scene, t_end: float | None = None) -> tuple[str, ...]:
-    """The names of channels that are open at the start, or at any time until `t_end` (s).
+def undetermined(scene: Scene, t_end: float | None = None) -> Openness:
+    """The components of loads and drive loads that are open at the start, or at any time until `t_end` (s).
 
     Where all loads are determined at the start and no event holds or releases a coordinate, they are determined
     everywhere but at single instants: rows that are independent somewhere are so nearly everywhere.
     """
     if not scene.constraints:
-        return ()
+        return Openness()
     with asking("general"):
         try:
-            names = _open(scene)
+            found = _open(scene)
         except NotImplementedError:  # the dense route has no bodies of Standard Input Data
-            return tuple(sorted(_by_flexmb(scene)))
-        if t_end is not None and (names or _holds(scene)):
-            names |= _open_in_run(scene, t_end)
-    return tuple(sorted(names))
+            return _by_flexmb(scene)
+        if t_end is not None and (found or _holds(scene)):
+            found |= _open_in_run(scene, t_end)
+    return found
 
 
-def _by_flexmb(scene: Scene) -> set[str]:
+def _by_flexmb(scene: Scene) -> Openness:
     """What flexmb itself finds open at the start, for scenes that the dense route refuses."""
     system = compile(scene)
     state = system.initial_state
     evaluation = system.evaluate(state.t, state.q, state.u)
-    loads = {f"load:{name}.{part}" for name, load in evaluation.loads.items() for part, at in PARTS
-             if np.isnan(load[at]).any()}  # fmt: skip
-    return loads | {f"drive:{name}" for name, drive in evaluation.drives.items() if np.isnan(drive).any()}
+    flags = {name: np.isnan(load) for name, load in evaluation.loads.items()}
+    return _openness(flags, {name: np.isnan(drive) for name, drive in evaluation.drives.items()})
 
 
-def _open(scene: Scene) -> set[str]:
+def _open(scene: Scene) -> Openness:
     """At the start; the initial values themselves where flexmb cannot close the scene's closures."""
     try:
         state = compile(scene).initial_state
@@ -72,14 +73,14 @@ def _open(scene: Scene) -> set[str]:
     return _at(dense, state, _prescribed(dense))
 
 
-def _open_in_run(scene: Scene, t_end: float) -> set[str]:
+def _open_in_run(scene: Scene, t_end: float) -> Openness:
     """At some times of flexmb's run, and after each of its events."""
     try:
         allowed = structs.replace(scene, allow=(*scene.allow, *WAIVERS))
         run = simulate(allowed, t_end, samples=PLACES, rtol=1e-8, atol=1e-10, max_steps=STEPS)
     except (ClosureError, NotImplementedError):
-        return set()
-    dense, unknown = DenseSystem(scene), set[str]()
+        return Openness()
+    dense, unknown = DenseSystem(scene), Openness()
     for state, held in _states(dense, run):
         unknown |= _at(dense, state, held)
     return unknown
@@ -139,7 +140,15 @@ def _prescribed(dense: DenseSystem) -> Held:
     return held
 
 
-def _at(dense: DenseSystem, state: State, held: Held) -> set[str]:
-    names = open_loads(dense, state.q, held)
-    loads = {f"load:{name}.{part}" for name, is_open in names.loads.items() for part, at in PARTS if is_open[at].any()}
-    return loads | {f"drive:{name}" for name, is_open in names.drives.items() if is_open}
+def _at(dense: DenseSystem, state: State, held: Held) -> Openness:
+    """What is open at a state. Of a drive whose coordinates are not always held all components count as open."""
+    found, always = open_loads(dense, state.q, held), _prescribed(dense)
+    sometimes = {x.owner for x in dense.tree.scalars if held[x.u] and not always[x.u]}
+    drives = {name: flags | (name in sometimes and np.any(flags)) for name, flags in found.drives.items()}
+    return _openness(found.loads, drives)
+
+
+def _openness(loads: Mapping[str, Flags], drives: Mapping[str, Flags]) -> Openness:
+    """From flags (6,) of loads and (k,) of drive loads, by name."""
+    parts = ((f"load:{name}.{part}", flags[at]) for name, flags in loads.items() for part, at in LOAD_PARTS.items())
+    return Openness.of_flags(chain(parts, ((f"drive:{name}", flags) for name, flags in drives.items())))

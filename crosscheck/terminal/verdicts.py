@@ -73,6 +73,8 @@ def _inventory(outcome: SessionOutcome) -> str:
         parts.append(f"{len(outcome.unjudged)} offered and judged by nothing")
     if outcome.undetermined:
         parts.append(f"{outcome.undetermined} not determined by the motion")
+    if outcome.partly_determined:
+        parts.append(f"{outcome.partly_determined} determined in some components")
     return f"{count} case{'s' if count > 1 else ''}: {', '.join(parts)}"
 
 

@@ -158,8 +158,9 @@ def _asked(variant: Variant, engines: Sequence[str]) -> Variant:
 
 def _rival(job: Job, level: str, case: CaseResults, reference: ReferenceSignals, held: RecordedReference) -> Rival:
     asked, result = held.asked.get(job.engine) or _of_all(held), case.get(job.variant, job.engine)
-    findings = list(hold(result, reference, asked, case.undetermined(job.variant)))
-    scales = {name: finding.scale for name, _, finding in findings if finding.scale is not None and finding.scale > 0.0}
+    findings = list(hold(result, reference, asked, result.open))
+    known = ((name, finding.scale) for name, _, finding in findings if finding.scale is not None)
+    scales = {name: scale for name, scale in known if scale > 0.0 and name not in result.open}
     offered = [finding for _, _, finding in findings if finding.status != "refused"] or [
         finding[2] for finding in findings
     ]

@@ -114,7 +114,7 @@ class EngineTarget:
         begun = times if times[0] <= CLOCK * times[-1] else np.concatenate([[0.0], times])
         result = self._run(begun)
         places = np.arange(len(begun))[len(begun) - len(times) :]
-        return {name: _at(result.signal(name, across=False), places) for name in result.channels}
+        return {name: _at(result.signal(name, across=False), places) for name in result.determined_channels}
 
     def _run(self, times: Real) -> Result:
         """The engine's result on the variant at the times, run now."""

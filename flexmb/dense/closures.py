@@ -143,10 +143,10 @@ def through_hinges(dense: DenseSystem, q: Real, loads: Mapping[str, Real]) -> di
 
 class OpenLoads(NamedTuple):
     """Which loads the motion leaves open: components (6,) of those of hinges, closures and couplings, World axes, and
-    the drive loads of hinges, point masses and wheels that are held."""
+    the drive loads (k,) of hinges, point masses and wheels for each of their coordinates that is held."""
 
     loads: dict[str, NDArray[np.bool_]]
-    drives: dict[str, bool]
+    drives: dict[str, NDArray[np.bool_]]
 
 
 def open_loads(dense: DenseSystem, q: Real, held: NDArray[np.bool_]) -> OpenLoads:
@@ -168,9 +168,12 @@ def open_loads(dense: DenseSystem, q: Real, held: NDArray[np.bool_]) -> OpenLoad
     least = UNCHANGED * max(
         (np.max(np.abs(change), initial=0.0) for change in (*changes.values(), drives)), default=0.0
     )
-    reached = np.any(drives > least, axis=1) & held
+    reached = np.any(drives > least, axis=1)
+    places: dict[str, list[int]] = {}
+    for x in dense.tree.scalars:
+        if held[x.u]:
+            places.setdefault(x.owner, []).append(x.u)
     return OpenLoads(
         {name: np.any(np.abs(change) > least, axis=1) for name, change in changes.items()},
-        {x.owner: False for x in dense.tree.scalars if held[x.u]}
-        | {x.owner: True for x in dense.tree.scalars if reached[x.u]},
+        {name: reached[at] for name, at in places.items()},
     )

@@ -1,7 +1,8 @@
 """Engines that are bad on purpose: each takes a sound engine's run and spoils it in one respect.
 
-`WRONG` are those whose answer is wrong, or that say what is not true; `HARMLESS` only look so. `FATAL` end or block
-their process, and need one of their own.
+`WRONG` are those whose answer is wrong, or that say what is not true; `HARMLESS` only look so. `BESIDE_OPEN` are wrong
+where redundant closures leave some components of a load open. `FATAL` end or block their process, and need one of their
+own.
 """
 
 import os
@@ -216,8 +217,31 @@ def _crash_at_first(run: Trajectory, n: int) -> Trajectory:
     return run if n else os._exit(0)
 
 
+def _beside_open(change: Callable[[Real, Real], Real]) -> Spoil:
+    """Of every torque and force with components that are NaN, the others changed: (values (T,3), flags) -> values."""
+
+    def spoil(run: Trajectory, n: int) -> Trajectory:
+        loads = {name: load.copy() for name, load in run.loads.items()}
+        for load in loads.values():
+            for part in (load[:, :3], load[:, 3:]):
+                is_open = np.isnan(part).any(axis=0)
+                if is_open.any() and not is_open.all():
+                    part[:] = np.where(is_open, part, change(part, is_open))
+        return replace(run, loads=loads)
+
+    return spoil
+
+
+BESIDE_OPEN: dict[str, Spoil] = {
+    "wrong-beside-open": _beside_open(lambda part, is_open: 1.01 * part),
+    "nan-beside-open": _beside_open(lambda part, is_open: np.full_like(part, np.nan)),
+    "claims-beside-open": lambda run, n: replace(
+        run, undetermined=tuple(dict.fromkeys(name.partition("[")[0] for name in run.undetermined))
+    ),
+}
+"""Wrong in determined components of loads that are partly open, and in nothing else."""
 FATAL: dict[str, Spoil] = {"crashes": _crash, "hangs": _hang, "crashes-when-coarsest": _crash_at_first}
-ALL = WRONG | HARMLESS | FATAL
+ALL = WRONG | HARMLESS | BESIDE_OPEN | FATAL
 
 
 @dataclass(frozen=True)

@@ -211,6 +211,25 @@ def test_numbers_that_nothing_determines_need_not_be_finite() -> None:
         checked_run(replace(GOOD, **half, undetermined=("load:pivot.force",)), TIMES, SCENE)
 
 
+@pytest.mark.parametrize("column", range(6))
+def test_a_number_that_is_none_must_be_in_an_open_component(column: int) -> None:
+    rows = numbers(6)
+    rows[3, column] = np.nan
+    (part, other), axis = ("torque", "force")[:: 1 if column < 3 else -1], "xyz"[column % 3]
+    run = replace(GOOD, loads=GOOD.loads | {"pivot": rows}, undetermined=(f"load:pivot.{part}[{axis}]",))
+    assert checked_run(run, TIMES, SCENE).undetermined == run.undetermined
+    all_others = f"load:pivot.{part}[{', '.join('xyz'.replace(axis, ''))}]", f"load:pivot.{other}"
+    with pytest.raises(BrokenContract, match=r"loads\['pivot'\] is not finite"):
+        checked_run(replace(run, undetermined=all_others), TIMES, SCENE)
+
+
+@pytest.mark.parametrize("name", ["drive:pivot[3]", "drive:pivot[0]", "load:pivot.force[w]", "load:pivot.force[1]"])
+def test_a_component_that_the_run_does_not_have_is_refused(name: str) -> None:
+    drives = GOOD.drives | {"pivot": numbers(2)}
+    with pytest.raises(BrokenContract, match="it names channels of loads and drives that the run has"):
+        checked_run(replace(GOOD, drives=drives, undetermined=(name,)), TIMES, SCENE)
+
+
 @pytest.mark.parametrize(("change", "text"), BREACHES)
 def test_each_breach_is_named_with_its_place(change: dict[str, Any], text: str) -> None:
     with pytest.raises(BrokenContract) as caught:

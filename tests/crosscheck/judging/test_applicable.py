@@ -17,6 +17,7 @@ from crosscheck.engines.native import NativeEngine
 from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.library.accepted import Figure, key
 from crosscheck.records.kinds import RunRecord
+from crosscheck.records.packing import pack, unpack
 from crosscheck.report.ci import write_summary
 from crosscheck.report.junit import write_junit
 from crosscheck.terminal.text import Verbosity
@@ -210,6 +211,49 @@ def test_nobody_is_compared_in_what_the_motion_leaves_open(tmp_path):
     assert "not determined" in (tmp_path / "summary.md").read_text(encoding="utf-8")
 
 
+PART = "load:pin.torque[y]"
+
+
+def with_other_y(runs):
+    """The runs with other numbers in the second component of the torque."""
+    changed = []
+    for run in runs:
+        rows = unpack(run.channels[TORQUE])
+        rows[:, 1] += 5.0
+        changed.append(msgspec.structs.replace(run, channels=run.channels | {TORQUE: pack(rows)}))
+    return changed
+
+
+def test_an_open_component_is_not_compared_and_those_beside_it_are(tmp_path):
+    both = {TIP: way(), FORCE: way(), TORQUE: way()}
+    runs = [*ladder("one", both), *with_other_y(ladder("two", both)), *ladder("three", both)]
+    assert {each.channel for each in judged(THREE_OPEN, runs).unexpected} == {TORQUE}
+    outcome = judged(THREE_OPEN, runs, undetermined=(PART,), strict=True)
+    assert not outcome.unexpected and not outcome.unjudged
+    assert {each.channel for each in outcome.all} == {TIP, FORCE, TORQUE}
+    assert {each.reason.rpartition("; ")[2] for each in outcome.all if each.channel == TORQUE} == {
+        "y not determined and not compared"
+    }
+    assert {(each.engine, each.channel, each.kind) for each in outcome.inapplicable} == {
+        (engine, PART, "partly determined") for engine in ("one", "two", "three")
+    }
+    assert (outcome.undetermined, outcome.partly_determined) == (0, 1)
+    outcome = judged(THREE_OPEN, runs, undetermined=(PART,))
+    assert outcome.ok and "not determined and not judged: components of 1 channel" in outcome.headline
+    write_summary(outcome, tmp_path / "summary.md")
+    assert PART in (tmp_path / "summary.md").read_text(encoding="utf-8").replace("\\", "")
+    assert "1 determined in some components" in told(outcome)[1]
+    other = judged(THREE_OPEN, runs, undetermined=("load:pin.torque[x]",))
+    assert {each.channel for each in other.unexpected} == {TORQUE}
+
+
+def test_a_claim_of_a_whole_channel_that_is_open_in_part_fails_its_author():
+    outcome = judged(THREE_OPEN, records(said=True), undetermined=(PART,))
+    mine = [each for each in outcome.all if "one" in (each.engine_a, each.engine_b)]
+    assert mine and all(each.status == "failed" and "'load:pin.torque[x, z]'" in each.reason for each in mine)
+    assert all(each.ok for each in outcome.all if each not in mine)
+
+
 ACROSS = """
 [[variant]]
 name = "rigid"
@@ -311,7 +355,12 @@ def test_our_own_engine_names_open_loads_and_the_contract_takes_them(run):
     scene, times, found = run
     checked = checked_run(found, times, scene)
     names = ("drive", "loop", "pin", "pivot")
-    assert checked.undetermined == tuple(f"load:{name}.{part}" for name in names for part in ("force", "torque"))
+    parts = "force[z]", "torque[x, y]"
+    assert checked.undetermined == tuple(f"load:{name}.{part}" for name in names for part in parts)
+    whole = tuple(f"load:{name}.{part}" for name in names for part in ("force", "torque"))  # judged by the scene later
+    assert checked_run(replace(found, undetermined=whole), times, scene).undetermined == whole
+    with pytest.raises(BrokenContract, match=r"loads\['drive'\] is not finite"):
+        checked_run(replace(found, undetermined=(*checked.undetermined[2:], "load:drive.torque[x, z]")), times, scene)
 
 
 def test_numbers_that_are_none_must_be_named(run):

@@ -20,11 +20,13 @@ from crosscheck.library.find import load_case, shipped_folder
 from crosscheck.records.archive import read
 from crosscheck.records.kinds import CaseRecord, RunRecord
 from crosscheck.records.packing import Packed, pack, unpack
+from crosscheck.records.session import last_session
+from crosscheck.report.charts import payload
 from crosscheck.running.plan import plan
 from crosscheck.running.pool import run_jobs
 from crosscheck.running.scheduler import Limits
 from flexmb.typing import Real
-from tests.crosscheck.bad_engines import FATAL, HARMLESS, WRONG
+from tests.crosscheck.bad_engines import BESIDE_OPEN, FATAL, HARMLESS, WRONG
 from tests.crosscheck.sessions import CASE, run_case, run_here
 
 SHIPPED = Path(__file__).parents[3] / "cases" / "closed_chains" / "four_bar" / "scene.toml"
@@ -147,7 +149,7 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Sound]:
         outcome = run_case(case, folder / "records.jsonl", provider=kind.provider)
         assert outcome.ok and not outcome.lost_controls, outcome.headline
         found[name] = Sound(kind, case, folder / "records.jsonl", outcome)
-    assert (found["tree"].outcome.undetermined, found["chain"].outcome.undetermined > 0) == (0, True)
+    assert (found["tree"].outcome.partly_determined, found["chain"].outcome.partly_determined > 0) == (0, True)
     return found
 
 
@@ -173,6 +175,42 @@ def test_what_is_not_wrong_stays_green(tmp_path, sound, kind, bad):
     holds(sound[kind].outcome, beside, bad)
     assert beside.ok, [each.reason for each in beside.unexpected]
     assert any(bad in (each.engine_a, each.engine_b) for each in beside.all)
+
+
+@pytest.mark.parametrize("bad", BESIDE_OPEN)
+def test_what_is_wrong_beside_open_components_is_noticed_there_alone(tmp_path, sound, bad):
+    """A wrong value in a determined component, one that is none, and a claim that it is open."""
+    beside = sound["chain"].beside(tmp_path, bad)
+    holds(sound["chain"].outcome, beside, bad)
+    mine = [each for each in beside.all if bad in (each.engine_a, each.engine_b)]
+    assert {each.variant_a for each in mine if not each.ok} == {"redundant"}
+    if bad == "wrong-beside-open":
+        wrong = [each for each in mine if not each.ok]
+        assert {each.status for each in wrong} == {"differ"} and {each.channel[:5] for each in wrong} == {"load:"}
+        assert all("not determined and not compared" in each.reason for each in wrong)
+    else:
+        said = {"nan-beside-open": "is not finite", "claims-beside-open": "the motion of the scene determines it"}
+        assert all(each.status == "failed" and said[bad] in each.reason for each in mine if not each.ok)
+
+
+def test_numbers_in_open_components_need_no_verdict_in_a_strict_session(tmp_path, sound):
+    """They are judged by nothing, and are nothing that must be judged; what they are is told by component."""
+    beside = sound["chain"].beside(tmp_path, "any-open-loads")
+    assert not beside.unexpected and {each.channel for each in beside.unaccounted} <= {"work"}
+    told = {each.channel for each in beside.inapplicable if each.engine == "any-open-loads"}
+    assert "load:loop.force[z]" in told and "load:loop.torque[x, y]" in told
+
+
+def test_charts_draw_determined_components_alone(sound):
+    (case,) = collect(last_session(read(sound["chain"].records))).cases
+    panels = payload(case, sound["chain"].outcome.verdicts[case.case.case])["panels"]
+    drawn = {
+        (panel["comparison"].partition(",")[0], channel["name"]): channel["components"]
+        for panel in panels
+        for channel in panel["channels"]
+    }
+    assert drawn["redundant", "load:loop.force"] == ["x", "y"] and drawn["redundant", "load:loop.torque"] == ["z"]
+    assert drawn["determined", "load:loop.force"] == drawn["redundant", "marker:joint.position"] == ["x", "y", "z"]
 
 
 @pytest.mark.slow

@@ -237,6 +237,11 @@ def test_what_an_engine_leaves_undetermined_is_recorded_and_its_numbers_are_not(
     (found,) = records(Actor(play=lambda run, count: replace(run, undetermined=(open_load,))), finest_only=True)
     assert found.undetermined == (open_load,) and open_load not in found.channels
     assert "load:pivot.force" in found.channels
+    open_part = "load:pivot.force[x, z]"
+    (found,) = records(Actor(play=lambda run, count: replace(run, undetermined=(open_part,))), finest_only=True)
+    assert found.undetermined == (open_part,)
+    rows = unpack(found.channels["load:pivot.force"])
+    assert np.array_equal(np.isnan(rows), np.tile([True, False, True], (len(rows), 1)))
 
 
 def test_an_engine_is_asked_about_the_start_and_the_duration_of_the_job() -> None:

@@ -66,6 +66,8 @@ def check(seed: int, kinds: tuple[str, ...] = loops.KINDS) -> None:
     assert {name for name, each in determined.items() if not each.all()} == {
         name for name, load in by_dense.loads.items() if load.any()
     }
+    for name, load in by_dense.loads.items():
+        assert np.array_equal(load, ~determined[name]), name
 
 
 def can_move(scene: s.Scene) -> bool:
