@@ -174,7 +174,8 @@ def _raw(body: ModalBody, count: int, level: Level) -> ModalBody:
     }
     return replace(
         body, file=None, points=points, nodes=nodes, level=level,
-        stiffness=_nested(_symmetric(arrays.stiffness, X)), damping=_nested(_symmetric(arrays.damping, X)), **geometric,
+        stiffness=_nested(_symmetric(arrays.stiffness, X)), stiffness_factor=1.0,
+        damping=_nested(_symmetric(arrays.damping, X)), **geometric,
     )  # fmt: skip
 
 

@@ -147,7 +147,8 @@ class _Family:
     def __init__(self, scene: Scene, number: str, asked: Real) -> None:
         Number(scene, number)  # PathError unless it is one real number
         first: Scene = with_values(scene, {number: float(asked[0])})
-        self.number, self.system = Number(first, number), built(first)
+        self.system = built(first)
+        self.number = Number(self.system.scene, number)  # of which bodies in files have been read
         self.name, self.range, self._middle = scene.name, float(np.ptp(asked)), float(np.mean(asked[[0, -1]]))
         self.unit = 1.0
         self._here = self._beside = self._made(self.number.value, None)

@@ -47,6 +47,7 @@ FINER = f"give 0 to {MOST_POLYNOMIALS}, and more pieces where these are not enou
 Polynomials = Annotated[int, whole(0, MOST_POLYNOMIALS, noun="polynomials", remedy=FINER)]
 Rotary = Annotated[float, within(0.0, noun="rotary inertia")]
 Ratio = Annotated[float, within(0.0, waiver="negative_damping"), PURE]
+Factor = Annotated[float, within(0.0, excluded=0.0), PURE]
 # Modal coordinates of raw bodies are numbers without unit.
 Shapes = Annotated[tuple[Vector, ...], unit("m")]
 Turns = Annotated[tuple[Vector, ...], unit("rad")]
@@ -278,12 +279,17 @@ class ModalBody(SceneStruct, frozen=True, kw_only=True, tag="modal", tag_field="
     axis a on all points, and `gradient_stiffness[a][b]` (3,3,m,m) under mass times the points' coordinate b along axis
     a. The geometric stiffness that a finite-element code computes for spin about z is gradient_stiffness [x][x] +
     [y][y], that for angular acceleration about z is [x][y] - [y][x]. Matrices are positive if the load stiffens.
+
+    `stiffness_factor` multiplies the stiffness matrix, and nothing else: one number for fits, sensitivities and
+    uncertainty, by whose square root all frequencies of the held body scale. Damping stays, and so does geometric
+    stiffness, which is that of loads.
     """
 
     name: str
     points: tuple[InertiaPoint, ...] = ()
     file: str | None = None
     stiffness: Annotated[Matrix, unit("N m")] = ()
+    stiffness_factor: Factor = 1.0
     damping: Annotated[Matrix, unit("N m s")] = ()
     gravity_stiffness: Annotated[tuple[Matrix, ...], unit("kg m")] = ()
     gradient_stiffness: Annotated[tuple[tuple[Matrix, ...], ...], unit("kg m²")] = ()
@@ -296,11 +302,13 @@ class SidBody(SceneStruct, frozen=True, kw_only=True, tag="sid", tag_field="kind
     """A body from a Standard Input Data file (Wallrapp 1994), which also defines its nodes.
 
     `compile` converts it to a raw modal body with the same modal integrals. The adapters of other codes refuse it: for
-    them, convert the file by `flexmb import`.
+    them, convert the file by `flexmb import`. `stiffness_factor` multiplies the stiffness of the file, as in a raw modal
+    body.
     """
 
     name: str
     file: str
+    stiffness_factor: Factor = 1.0
     level: Level = "full"
 
 

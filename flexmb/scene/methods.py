@@ -55,19 +55,23 @@ class SchemaMethods(Collector):
 
     def modal_body(
         self, name: str, *, points: Sequence[s.InertiaPoint] = (), file: str | None = None,
-        stiffness: ArrayLike = (), damping: ArrayLike = (), gravity_stiffness: ArrayLike = (),
-        gradient_stiffness: ArrayLike = (), boundary: Literal["clamped-free", "free-free"] = "clamped-free",
-        level: s.Level = "full", nodes: Sequence[s.ModalNode] = (),
+        stiffness: ArrayLike = (), stiffness_factor: float = 1.0, damping: ArrayLike = (),
+        gravity_stiffness: ArrayLike = (), gradient_stiffness: ArrayLike = (),
+        boundary: Literal["clamped-free", "free-free"] = "clamped-free", level: s.Level = "full",
+        nodes: Sequence[s.ModalNode] = (),
     ) -> Self:  # fmt: skip
         """Raw points and modes, inline (`points`) or in an `.npz` beside the scene file (`file`).
 
-        See ModalBody: `stiffness` (N m), `damping` (N m s), `gravity_stiffness` (kg m),
+        See ModalBody: `stiffness` (N m), `stiffness_factor` (> 0), `damping` (N m s), `gravity_stiffness` (kg m),
         `gradient_stiffness` (kg m²).
         """
         return self._made(s.ModalBody, locals())
 
-    def sid_body(self, name: str, file: str, *, level: s.Level = "full") -> Self:
-        """A body from a Standard Input Data file (Wallrapp 1994), which also defines its nodes."""
+    def sid_body(self, name: str, file: str, *, stiffness_factor: float = 1.0, level: s.Level = "full") -> Self:
+        """A body from a Standard Input Data file (Wallrapp 1994), which also defines its nodes.
+
+        See SidBody: `stiffness_factor` (> 0).
+        """
         return self._made(s.SidBody, locals())
 
     def weld(

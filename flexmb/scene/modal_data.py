@@ -46,7 +46,7 @@ REQUIRED = ("mass", "position", "translation_modes")
 
 
 def modal_arrays(body: ModalBody) -> ModalArrays:
-    """Arrays of `body`, with zeros for optional ones that are not given.
+    """Arrays of `body`, with zeros for optional ones that are not given, and the stiffness times its factor.
 
     Raises OSError if the file cannot be read, and ValueError, which names the array, if one is missing or has a wrong
     shape.
@@ -57,7 +57,8 @@ def modal_arrays(body: ModalBody) -> ModalArrays:
             if name in given:
                 raise ValueError(f'"{name}" is given in the scene and in "{body.file}"')
             given[name] = _array(name, matrix)
-    return _shaped(given)
+    arrays = _shaped(given)
+    return arrays._replace(stiffness=body.stiffness_factor * arrays.stiffness)
 
 
 def node_arrays(node: ModalNode) -> dict[str, Real]:

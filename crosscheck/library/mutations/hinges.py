@@ -85,11 +85,10 @@ def _stiffer_body(body: Body) -> Body:
     match body:
         case BeamBody():
             return scaled_stations(body, ("EA_N", "EIy_Nm2", "EIz_Nm2", "GJ_Nm2"), stiffer)
-        case ModalBody() if body.stiffness:
-            return replace(body, stiffness=scaled(body.stiffness))
-        case RigidBody() | ModalBody() | SidBody():
-            what = f'control "stiffness" changes beams, inline modal bodies and hinge springs, not "{body.name}"'
-            raise CaseError(what)
+        case ModalBody() | SidBody():
+            return replace(body, stiffness_factor=FACTOR * body.stiffness_factor)
+        case RigidBody():
+            raise CaseError(f'control "stiffness" changes flexible bodies and hinge springs, not "{body.name}"')
         case _:
             assert_never(body)
 

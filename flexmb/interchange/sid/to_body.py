@@ -119,7 +119,7 @@ def _from_its_file(body: SidBody) -> ModalBody:
     bodies = imported_sid(read_sid(body.file), body.name, body.level)
     for disagreement in bodies.disagreements:
         warnings.warn(f"{body.file}: {disagreement}", SceneWarning, stacklevel=3)
-    return bodies.body
+    return msgspec.structs.replace(bodies.body, stiffness_factor=body.stiffness_factor)
 
 
 def _repaired(sid: Sid, disagreements: list[str]) -> Sid:

@@ -41,6 +41,7 @@ NOT_IN_SCENES = {
     "UserLaw.initial": "laws of users, see test_sensitivities", "UserLaw.parameters": "likewise",
     **{f"{law}.{key}": "as of a Pid" for law in ("GainTable", "Saturation", "StateSpace", "UserLaw")
        for key in ("period_s", "offset_s", "delay_s")},
+    "SidBody.stiffness_factor": "as of the ModalBody that it becomes, see tests/flexmb/modal/test_stiffness_factor",
     "ModalBody.gradient_stiffness": "stiffness under loads, from other codes",
     "ModalBody.gravity_stiffness": "likewise", "ModalNode.force_stiffness": "likewise",
 }  # fmt: skip
