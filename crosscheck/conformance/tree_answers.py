@@ -98,7 +98,8 @@ def _modal(body: ModalBody) -> dict[str, Any]:
     nodes = (origin, *body.nodes)
     at_points = [_shapes(point, count) for point in body.points]
     return {
-        "modes": count, "stiffness": body.stiffness_factor * np.array(body.stiffness), "damping": body.damping or np.zeros((count, count)),
+        "modes": count, "stiffness": body.stiffness_factor * np.array(body.stiffness),
+        "damping": body.damping or np.zeros((count, count)),
         "nodes": {node.name: _shapes(node, count) | {"rotation": rotation_matrix(node.quaternion)} for node in nodes},
         "points": {key: [point[key] for point in at_points] for key in at_points[0]} | {
             "mass_kg": [point.mass_kg for point in body.points],

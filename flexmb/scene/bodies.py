@@ -302,8 +302,8 @@ class SidBody(SceneStruct, frozen=True, kw_only=True, tag="sid", tag_field="kind
     """A body from a Standard Input Data file (Wallrapp 1994), which also defines its nodes.
 
     `compile` converts it to a raw modal body with the same modal integrals. The adapters of other codes refuse it: for
-    them, convert the file by `flexmb import`. `stiffness_factor` multiplies the stiffness of the file, as in a raw modal
-    body.
+    them, convert the file by `flexmb import`. `stiffness_factor` multiplies the stiffness of the file, as in a raw
+    modal body.
     """
 
     name: str
