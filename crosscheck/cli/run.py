@@ -89,7 +89,8 @@ def run(
 
     **A scene or a robot** (`.toml`, `.urdf`, `.xml`, `.sid`) with `--t-end` needs no case: a folder `cases/NAME` in
     `--out` gets its scene, with a marker at the frame of every body, and a run.toml with usual goals. Native and all
-    other codes that are installed run it; what one of them cannot represent is *not applicable*.
+    other codes that are installed run it; what one of them cannot represent is *not applicable*. Impossible inertia of
+    a robot is repaired, and one that would rest begins with rates; notes say so.
 
     **Your own engine**: `--goal` replaces goals that it is not meant to meet, `--efforts` adds efforts where U is too
     large, and a file, `--expect`, keeps both, with failures that you expect and their reasons; `docs/expectations.md`

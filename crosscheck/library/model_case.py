@@ -7,10 +7,12 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from crosscheck.library.case_error import CaseError
+from crosscheck.library.starting import RATE, is_welded, moves, started
 from flexmb.output.whole import write_whole
 from flexmb.scene.bodies import Body, RigidBody
 from flexmb.scene.files import inline, load_scene, save_scene
 from flexmb.scene.hinges import Weld
+from flexmb.scene.problems import SceneError
 from flexmb.scene.schema import Marker, Scene
 from flexmb.scene.tree import GROUND, node_names, ordered
 
@@ -29,9 +31,10 @@ def is_model(word: str) -> bool:
 def scene_of(model: Path) -> tuple[Scene, tuple[str, ...]]:
     """The scene of a model, with markers, and notes on what it omits of that.
 
-    CaseError, which names the file, for a model that cannot be a scene.
+    Of a robot, impossible inertia is repaired, so that all codes have the same. One that no joint moves flies freely;
+    one that would rest gets rates, for results that never change tell nothing of a code. Notes say so. CaseError, which
+    names the file, for a model that cannot be a scene.
     """
-    from flexmb.interchange.models import read_model
     from flexmb.interchange.sid import with_sid_bodies
     from flexmb.scene.check import check_scene
 
@@ -40,11 +43,30 @@ def scene_of(model: Path) -> tuple[Scene, tuple[str, ...]]:
             scene, notes = load_scene(model), tuple[str, ...]()
             check_scene(scene)
         else:
-            found = read_model(model)
-            scene, notes = found.scene, found.notes
+            scene, notes = _moving(model)
         return with_markers(with_sid_bodies(scene)), notes
     except (ValueError, OSError, ImportError) as error:
         raise CaseError(str(error)) from None
+
+
+def _moving(model: Path) -> tuple[Scene, tuple[str, ...]]:
+    """The scene of a model, in motion, and the notes."""
+    from flexmb.interchange.models import MJCF, URDF, read_model
+
+    ending = model.suffix.lower()
+    found = read_model(model, repair=ending not in MJCF)
+    if ending == URDF and is_welded(found.scene):
+        try:
+            free = read_model(model, repair=True, free_base=True)
+        except SceneError:
+            raise ValueError(
+                f"{model}: no joint moves, and the links have not the inertia of one that flies freely: there is no "
+                "motion to compare; give it joints, or its links inertia"
+            ) from None
+        return started(free.scene), (*free.notes, "no joint moves: the root link is free, and begins with a spin")
+    if is_welded(found.scene) or found.scene.closures or moves(found.scene):
+        return found.scene, found.notes
+    return started(found.scene), (*found.notes, f"nothing would move: joints begin at {RATE:g} rad/s or m/s")
 
 
 def write_case(scene: Scene, folder: Path, engines: tuple[str, str], t_end: float, samples: int) -> None:

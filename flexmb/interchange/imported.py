@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexmb.scene.check.inertia import PRINTED
 from flexmb.scene.problems import SceneError
 from flexmb.scene.rounding import ROUNDING
 from flexmb.scene.schema import Scene
@@ -40,13 +39,13 @@ def listed(names: list[str]) -> str:
     return ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
 
 
-def possible_inertia(mass: float, tensor: Real, com: Real) -> Real:
-    """The tensor about a mass centre at com itself if it is possible, as the checks of scenes see it; else the one in
-    which negative second moments sum m x x' are zero."""
+def possible_inertia(mass: float, tensor: Real) -> Real:
+    """The tensor about a mass centre itself if it is possible; else the one in which negative second moments
+    sum m x x' are zero. Dust that the checks of scenes admit goes too: other codes have checks of their own."""
     if mass == 0.0:
         return np.zeros((3, 3))
     second, axes = np.linalg.eigh(0.5 * np.trace(tensor) * np.eye(3) - tensor)
-    if second[0] >= -PRINTED * float(np.max(np.abs(tensor))) - ROUNDING * mass * (com @ com):
+    if second[0] >= -ROUNDING * float(np.max(np.abs(tensor))):
         return tensor
     second = np.maximum(second, 0.0)
     return np.sum(second) * np.eye(3) - (axes * second) @ axes.T

@@ -12,7 +12,8 @@ from flexmb.scene.schema import Scene
 
 SID = (".sid", ".sid_fem")
 MJCF = (".xml", ".mjcf")
-ENDINGS = (".urdf", *MJCF, *SID)
+URDF = ".urdf"
+ENDINGS = (URDF, *MJCF, *SID)
 
 
 def read_model(
@@ -26,7 +27,7 @@ def read_model(
     """
     path = Path(path)
     ending = path.suffix.lower()
-    if ending == ".urdf":
+    if ending == URDF:
         from flexmb.interchange.urdf import read_urdf
 
         return read_urdf(path, free_base=free_base, repair=repair, stop_stiffness=stop_stiffness, smoothing=smoothing)

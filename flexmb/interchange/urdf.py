@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import NoReturn
 from xml.etree import ElementTree
@@ -22,6 +24,7 @@ from flexmb.interchange.joint_connectors import SMOOTH, STOPS, JointConnectors
 from flexmb.interchange.urdf_mimic import SCALAR, Mimics
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.options import Placement
+from flexmb.scene.problems import Defect, SceneError
 from flexmb.scene.quaternions import about, quaternion_of
 from flexmb.scene.reading import Unreadable, read_text
 from flexmb.scene.tree import GROUND
@@ -47,7 +50,8 @@ def read_urdf(
 
     The root link is welded to the ground, or free with `free_base`; its initial frame is that of the World. Many
     published robots have inertia tensors that no body can have. They raise a SceneError, or with `repair` are changed
-    by the least amount that makes them possible, and a note lists them. Damping is that of the hinges. With
+    by the least amount that makes them possible, and a note lists them; a link with a mass alone is a point mass.
+    Damping is that of the hinges. With
     `stop_stiffness` (N m/rad or N/m) limits of angles and displacements become stops, with `smoothing` (rad/s or m/s)
     dry friction becomes a connector that is smooth below that rate; without, notes list them. Shapes, transmissions,
     and limits of efforts and rates are omitted. Mimic joints become couplings, and start where the joints that they
@@ -56,7 +60,17 @@ def read_urdf(
     """
     with naming(str(path)):
         robot = _Robot(str(path), _parsed(Path(path)), repair, stop_stiffness, smoothing)
-        return robot.scene(gravity, free_base)
+        try:
+            return robot.scene(gravity, free_base)
+        except SceneError as error:
+            raise SceneError(error.scene, [_with_repair(problem) for problem in error.problems]) from None
+
+
+def _with_repair(problem: Defect) -> Defect:
+    """A problem of the inertia of a link, which the option of the import can remove too."""
+    if not (problem.where.startswith("$.bodies") and "inertia" in problem.what):
+        return problem
+    return replace(problem, remedy=f"{problem.remedy}; flexmb import --repair makes the least change")
 
 
 def _parsed(path: Path) -> ElementTree.Element:
@@ -97,7 +111,7 @@ class _Robot:
         self.mimics = Mimics(self.joints, self._fail)
         self.extras = JointConnectors(stop_stiffness, smoothing, self.joints)
         self.ignored: dict[str, list[str]] = {}
-        self.repaired: list[str] = []
+        self.repaired, self.points, self.commas = list[str](), list[str](), list[str]()
 
     def scene(self, gravity: ArrayLike, free_base: bool) -> ImportedScene:
         root = self._root()
@@ -144,6 +158,8 @@ class _Robot:
                 other = children.get(child, name)
                 self._fail(f'joint "{name}"', f'link "{child}" is also the child of "{other}"', "a URDF is a tree")
             children[child] = name
+        if not self.links:
+            self._fail("robot", "it has no links", "expand its macros once more, with all files that they include")
         roots = [name for name in self.links if name not in children]
         if len(roots) != 1:
             what = f"{len(roots)} links are not the child of a joint ({listed(roots) or 'none'})"
@@ -170,15 +186,22 @@ class _Robot:
             return
         R, com = self._origin(place, inertial)
         mass = self._number(place, inertial, "mass", "value")
-        xx, yy, zz, xy, xz, yz = (
-            self._number(place, inertial, "inertia", f"i{k}") for k in ("xx", "yy", "zz", "xy", "xz", "yz")
-        )
-        tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        if self.repair and (changed := _largest((possible := possible_inertia(mass, tensor, com)) - tensor)):
+        tensor = self._tensor(place, name, inertial)
+        if self.repair and (changed := _largest((possible := possible_inertia(mass, tensor)) - tensor)):
             self.repaired.append(f"{name} (by {changed:.3g} of {_largest(tensor):.3g} kg m²)")
             tensor = possible
         turned = R @ tensor @ R.T
         builder.rigid_body(self._body_of(name), mass=mass, com=com, inertia=0.5 * (turned + turned.T))
+
+    def _tensor(self, place: str, name: str, inertial: ElementTree.Element) -> Real:
+        """The inertia (3,3) about the mass centre; that of a point, with a note, where the link has a mass alone."""
+        if inertial.find("inertia") is None:
+            self.points.append(name)
+            return np.zeros((3, 3))
+        xx, yy, zz, xy, xz, yz = (
+            self._number(place, inertial, "inertia", f"i{k}") for k in ("xx", "yy", "zz", "xy", "xz", "yz")
+        )
+        return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
     def _hinge(self, builder: SceneBuilder, name: str, joint: ElementTree.Element) -> None:
         place, kind = f'joint "{name}"', joint.get("type", "")
@@ -259,10 +282,13 @@ class _Robot:
         return axis / length
 
     def _vector(self, place: str, element: ElementTree.Element, key: str) -> Real:
-        words = element.get(key, "0 0 0").split()
-        numbers = [_real(word) for word in words]
+        text = element.get(key, "0 0 0")
+        words = re.sub(r",(?=\s)", " ", text)  # other readers stop a number at a comma that ends its word
+        numbers = [_real(word) for word in words.split()]
         if len(numbers) != 3 or not all(map(usable, numbers)):
-            self._fail(place, f'{key} is "{element.get(key)}"', "give three numbers")
+            self._fail(place, f'{key} is "{text}"', "give three numbers, with blanks between them")
+        if words != text:
+            self.commas.append(place)
         return np.array(numbers)
 
     def _number(self, place: str, inertial: ElementTree.Element, tag: str, key: str) -> float:
@@ -291,6 +317,10 @@ class _Robot:
             yield f"elements that URDF does not define are left out: {listed(others)}"
         if self.repaired:
             yield f"impossible inertia tensors were changed by the least amount: {listed(self.repaired)}"
+        if self.points:
+            yield f"links with a mass and no inertia tensor are point masses: {listed(self.points)}"
+        if commas := list(dict.fromkeys(self.commas)):
+            yield f"commas behind numbers are taken for blanks: {listed(commas)}"
         if fixed := self.mimics.on_fixed:
             yield f"fixed joints mimic nothing: {listed(fixed)}"
         if empty := [name for name, link in self.links.items() if link.find("inertial") is None]:

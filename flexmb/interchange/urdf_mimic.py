@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 
 from flexmb.interchange.imported import usable
 from flexmb.scene.build import SceneBuilder
+from flexmb.scene.problems import closest
 
 SCALAR = ("revolute", "continuous", "prismatic")
 """Types of joints that have one coordinate."""
@@ -62,7 +63,7 @@ class Mimics:
     def _mimic(self, name: str, element: ElementTree.Element) -> Mimic:
         place, other = f'joint "{name}"', element.get("joint", "")
         if other not in self._joints:
-            self._fail(place, f'it mimics "{other}", which is not a joint', "give the name of a joint")
+            self._fail(place, f'it mimics "{other}", which is not a joint', closest(other, self._joints))
         for joint in (name, other):
             kind = self._joints[joint].get("type", "")
             if kind not in SCALAR:

@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -91,6 +92,51 @@ def test_a_model_that_no_scene_can_be_names_its_file(tmp_path):
     (tmp_path / "r.urdf").write_text("<robot/>")
     with pytest.raises(CaseError, match=r"r\.urdf"):
         scene_of(tmp_path / "r.urdf")
+
+
+def made(folder: Path, *changes: tuple[str, str]) -> tuple[fm.Scene, tuple[str, ...]]:
+    """The scene of the robot with changed text, and the notes."""
+    text = URDF
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    (folder / "changed.urdf").write_text(text)
+    return scene_of(folder / "changed.urdf")
+
+
+def test_impossible_inertia_is_repaired_for_all_codes_and_noted(tmp_path):
+    scene, notes = made(tmp_path, ('izz="0.01"', 'izz="0.3"'))
+    assert any(note.startswith("impossible inertia tensors were changed by the least amount: arm") for note in notes)
+    a, b, c = np.linalg.eigvalsh(scene.bodies[1].inertia_kg_m2)
+    assert a + b >= c * (1.0 - 1e-12)
+    assert not any("impossible" in note for note in made(tmp_path)[1])
+
+
+LED = """<link name="led"><inertial><mass value="1"/>
+<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
+<joint name="k" type="continuous"><parent link="base"/><child link="led"/>
+<mimic joint="j" multiplier="-2"/></joint></robot>"""
+
+
+def test_a_robot_that_would_rest_begins_with_rates_in_the_proportions_of_its_couplings(tmp_path):
+    scene, notes = made(tmp_path, ('"0.1 0 -0.5"', '"0 0 -0.5"'), ("</robot>", LED))
+    assert "nothing would move: joints begin at 0.5 rad/s or m/s" in notes
+    rates = {hinge.name: hinge.rotation.rate for hinge in scene.hinges if isinstance(hinge, fm.Revolute)}
+    assert rates == {"j": 0.5, "k": -1.0}
+    state = fm.compile(scene).initial_state
+    assert np.allclose(state.u, (0.5, -1.0), rtol=0.0, atol=1e-15)
+    falling, notes = made(tmp_path)  # its mass centre is beside the joint: gravity moves it from rest
+    assert not any("begin" in note for note in notes) and not np.any(fm.compile(falling).initial_state.u)
+
+
+def test_a_robot_without_joints_flies_freely_and_one_that_cannot_is_refused(tmp_path):
+    scene, notes = made(tmp_path, ("continuous", "fixed"))
+    assert "no joint moves: the root link is free, and begins with a spin" in notes
+    assert isinstance(scene.hinges[0], fm.Free) and all(scene.hinges[0].angular_velocity_rad_s)
+    with pytest.raises(CaseError, match=r"changed\.urdf: no joint moves, .* there is no motion to compare"):
+        made(
+            tmp_path, ("continuous", "fixed"), ('<inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.01"/>', "")
+        )
 
 
 @pytest.mark.slow

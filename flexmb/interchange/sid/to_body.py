@@ -126,7 +126,7 @@ def _repaired(sid: Sid, disagreements: list[str]) -> Sid:
     """The file with the J nearest to its own that a body of this mass and mass centre can have."""
     centre = sid.mdCM.zero[:, 0] / sid.mass
     carried = sid.mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
-    J = possible_inertia(sid.mass, 0.5 * (sid.J.zero + sid.J.zero.T) - carried, centre) + carried
+    J = possible_inertia(sid.mass, 0.5 * (sid.J.zero + sid.J.zero.T) - carried) + carried
     changed = largest(J - sid.J.zero)
     if changed <= PRINTED * largest(sid.J.zero):
         return sid

@@ -289,7 +289,7 @@ BAD = {
     "entities": ('<!DOCTYPE robot [<!ENTITY a "b">]><robot/>', "declares entities"),
     "other xml": ("<sdf/>", 'the outermost element is "sdf"'),
     "no xml": ("robot", "not XML"),
-    "empty": ("<robot name='r'/>", "0 links"),
+    "empty": ("<robot name='r'/>", "it has no links: expand its macros"),
     "same name": (SINGLE.replace('name="b"', 'name="a"'), "one that is taken"),
 }
 
@@ -304,13 +304,55 @@ def test_what_is_no_tree_of_rigid_bodies_is_refused_with_place_and_remedy(fault,
 
 def test_inertia_that_no_body_has_is_refused_or_repaired(tmp_path):
     text = re.sub(r'izz="[^"]*"', 'izz="9"', SINGLE)
-    with pytest.raises(fm.SceneError, match="triangle|positive"):
+    with pytest.raises(fm.SceneError, match="(triangle|positive)(.|\\n)*flexmb import --repair makes the least change"):
         read(text, tmp_path)
     repaired = read(text, tmp_path, repair=True)
     assert re.search(r"changed by the least amount: a \(by [\d.]+ of 9 kg m²\), b \(by", repaired.notes[-1])
     moments = np.linalg.eigvalsh(repaired.scene.bodies[0].inertia_kg_m2)
     assert moments[0] + moments[1] >= moments[2] * (1.0 - 1e-12)
     assert read(SINGLE, tmp_path, repair=True) == read(SINGLE, tmp_path)  # what is possible stays as it is
+
+
+DUST = '<inertia ixx="0" ixy="0" ixz="1e-20" iyy="0" iyz="0" izz="0"/>'
+
+
+def test_dust_in_the_inertia_of_a_point_mass_is_read_and_repaired_for_codes_that_refuse_it(tmp_path):
+    text = re.sub(r"<inertia [^>]*>", DUST, SINGLE, count=1)
+    as_written, repaired = (read(text, tmp_path, repair=repair).scene.bodies[0] for repair in (False, True))
+    assert np.linalg.eigvalsh(as_written.inertia_kg_m2)[0] < -9e-21
+    moments = np.linalg.eigvalsh(repaired.inertia_kg_m2)
+    assert moments[0] >= -1e-33 and moments[2] <= 1e-20 * (1.0 + 1e-12)
+
+
+def test_a_link_with_a_mass_alone_is_a_point_mass_and_that_is_noted(tmp_path):
+    tip = (
+        '<link name="tip"><inertial><origin xyz="0.1 0 0"/><mass value="2"/></inertial></link>'
+        '<joint name="w" type="fixed"><parent link="b"/><child link="tip"/></joint></robot>'
+    )
+    text = SINGLE.replace("</robot>", tip)
+    found = read(text, tmp_path)
+    body = found.scene.bodies[2]
+    assert (body.mass_kg, body.com_m, np.any(body.inertia_kg_m2)) == (2.0, (0.1, 0.0, 0.0), np.False_)
+    assert "links with a mass and no inertia tensor are point masses: tip" in found.notes
+    with pytest.raises(ModelError, match="inertia ixx is missing"):  # an element that says nothing is none of a point
+        read(text.replace('<mass value="2"/>', '<mass value="2"/><inertia/>'), tmp_path)
+
+
+def test_commas_behind_numbers_are_blanks_and_that_is_noted(tmp_path):
+    text = SINGLE.replace("<axis", '<origin xyz="0.5, 0.25, 1" rpy="0.1, 0.2 0.3"/><axis')
+    text = re.sub(r"(<child [^>]*/>)<origin [^>]*/>", r"\1", text, count=1)
+    found = read(text, tmp_path)
+    assert found.scene.hinges[1].parent_position_m == (0.5, 0.25, 1.0)
+    assert any(note.startswith("commas behind numbers are taken for blanks: joint") for note in found.notes)
+    with pytest.raises(ModelError, match="give three numbers, with blanks between them"):  # 0.5 or 5/10: nobody knows
+        read(text.replace("0.5, 0.25, 1", "0,5 0,25 1"), tmp_path)
+
+
+def test_a_mimic_joint_that_names_no_joint_is_told_the_nearest_one(tmp_path):
+    (name,) = re.findall(r'<joint name="([^"]*)"', SINGLE)
+    text = SINGLE.replace("<axis", f'<mimic joint="{name}s"/><axis')
+    with pytest.raises(ModelError, match=f'which is not a joint: did you mean "{name}"'):
+        read(text, tmp_path)
 
 
 def test_a_link_may_be_called_ground_and_namespaces_of_macros_may_be_left_over(tmp_path):
