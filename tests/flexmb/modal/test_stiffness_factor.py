@@ -69,8 +69,12 @@ def test_frequencies_scale_by_the_root_and_deflections_by_the_inverse(body: Body
         for each, state in ((scene, one), (scaled, other))
     ]
     assert relative(frequencies[1], np.sqrt(factor) * frequencies[0]) < 1e-9
-    path = fm.equilibrium_path(scene, FACTOR, [1.0, factor])
-    assert relative(path.at(factor)[0].q, other.q) < 1e-9
+
+
+def test_a_path_of_equilibria_follows_the_factor(body: Body) -> None:
+    path = fm.equilibrium_path(held(body), FACTOR, [1.0, 1.05])
+    first, last = (path.at(factor)[0].q for factor in (1.0, 1.05))
+    assert relative(1.05 * last, first) < 1e-9
 
 
 def test_derivatives_are_those_of_the_closed_form_and_of_differences(body: Body) -> None:
