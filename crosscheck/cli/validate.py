@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from crosscheck.cli.common import Json, NoUserCode, Verbose, app, console, in_one_line, print_json
+from crosscheck.cli.common import Json, NoUserCode, Verbose, app, console, in_one_line, print_json, sole_writer
 
 
 def _complete_set(begun: str) -> list[str]:
@@ -27,6 +28,9 @@ def validate(
     samples: Annotated[
         int, typer.Option(min=0, max=10_000, help="Draw all inputs so many times, beside the first-order budget.")
     ] = 0,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="Folder for a page of each set and for validation.json.")
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the samples.")] = 0,
     verbose: Verbose = False,
     as_json: Json = False,
@@ -40,7 +44,8 @@ def validate(
     derivatives of the prediction) and of the reading (u_D). It is within if |E| is at most 2 u_val. A series with 19 of
     20 points within is *validated within u_val*; otherwise its model is wrong by what is shown. `--verbose` has every
     point, and which input its uncertainty comes from. `--samples 200` draws the inputs and shows how far u_input, which
-    is of first order, is from the deviation of the samples.
+    is of first order, is from the deviation of the samples. `--out FOLDER` writes a page of each set, with charts, and all
+    numbers as JSON.
 
     A set is a folder with `measured.toml`, `points.csv` and `model.py`; `docs/validation.md` says what they hold.
 
@@ -50,19 +55,22 @@ def validate(
     **Examples**: `crosscheck validate list` · `crosscheck validate composite_strips --verbose` ·
     `crosscheck validate all --json`
     """
-    with in_one_line():
+    with in_one_line() if out is None else sole_writer(out):
         from crosscheck.terminal.measured import points_table, series_table, sets_table, told_progress
         from crosscheck.validation.budget import budget
         from crosscheck.validation.document import document
-        from crosscheck.validation.measured_set import find_set, shipped_sets
+        from crosscheck.validation.measured_set import find_sets
 
-        chosen = [find_set(name) for name in (shipped_sets() if sets in (["all"], ["list"]) else dict.fromkeys(sets))]
+        chosen = find_sets(sets)
         if sets == ["list"]:
             if as_json:
                 print_json({each.name: {"title": each.content.title, "points": len(each.points)} for each in chosen})
             else:
                 console.print(sets_table(chosen))
             return
+        if out is not None:
+            from crosscheck.report.measured import write_measured  # before anything is computed
+
         budgets = []
         for measured in chosen:
             with told_progress(console, measured.name) as listener:
@@ -70,18 +78,17 @@ def validate(
             console.print(series_table(budgets[-1]))
             if verbose:
                 console.print(points_table(budgets[-1]))
-    verdicts = [verdict for of_set in budgets for verdict in of_set.verdicts()]
-    wrong = [verdict for verdict in verdicts if not verdict.ok]
-    points = sum(verdict.points for verdict in verdicts)
-    within = sum(verdict.within for verdict in verdicts)
-    console.print(
-        f"{within} of {points} points are within their uncertainty; "
-        + (
+        verdicts = [verdict for of_set in budgets for verdict in of_set.verdicts()]
+        wrong = [verdict for verdict in verdicts if not verdict.ok]
+        within, points = sum(each.within for each in verdicts), sum(each.points for each in verdicts)
+        headline = f"{within} of {points} points are within their uncertainty; " + (
             f"{len(wrong)} of {len(verdicts)} series are not as their files say"
             if wrong
             else f"all {len(verdicts)} series are as their files say"
         )
-    )
+        console.print(headline)
+        if out is not None:
+            console.print(f"Report: {write_measured(budgets, headline, out)}", soft_wrap=True)
     if as_json:
         print_json({of_set.of.name: document(of_set) for of_set in budgets})
     raise typer.Exit(1 if wrong else 0)

@@ -6,6 +6,7 @@ A page loads its case's data only, and plotly and three.js when a chart or an an
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -45,20 +46,16 @@ class Material:
 def write_site(material: Material, out: Path) -> Path:
     """Write `report/` with its index and pages, and a `report.html` that leads there; returns the index's path."""
     site = out / FOLDER
-    _clear(site)
+    clear_site(site)
     where = places((case.case.case for case in material.session.cases), single=False)
     index = _page("index.html.j2", material, root="", **_overview(material, where))
-    written: dict[str, str] = {}
-    for name in ("style.css", *SCRIPTS):
-        written[f"{ASSETS}/{name}"] = str(source(name))
-    for name in LIBRARIES:
-        written[f"{ASSETS}/{Path(name).name}"] = _library(name)
+    written = asset_files(SCRIPTS, LIBRARIES)
     for case in material.session.cases:
         place = where[case.case.case]
         view = _view(case, material, place)
         written[place.page] = _page("case_page.html.j2", material, root=place.root, case=view)
         written[place.data] = _registration(case, material, place)
-    _write_pages(site, written | {INDEX: index})
+    write_pages(site, written | {INDEX: index})
     leading = templates().get_template("leading.html.j2").render(outcome=material.outcome, index=f"{FOLDER}/{INDEX}")
     write_whole(out / SINGLE, _encoded(leading))
     return site / INDEX
@@ -66,7 +63,7 @@ def write_site(material: Material, out: Path) -> Path:
 
 def write_single(material: Material, out: Path) -> Path:
     """Write the whole report into one file that loads no other, instead of pages; returns its path."""
-    _clear(out / FOLDER)
+    clear_site(out / FOLDER)
     cases = material.session.cases
     where = places((case.case.case for case in cases), single=True)
     text = _page(
@@ -87,11 +84,17 @@ def write_unfinished(outcome: SessionOutcome, out: Path) -> None:
     """Replace an earlier report by a page that says that the session has not ended."""
     text = templates().get_template("unfinished.html.j2").render(outcome=outcome)
     write_whole(out / SINGLE, _encoded(text))
-    if _clear(out / FOLDER):
-        _write_pages(out / FOLDER, {INDEX: text})
+    if clear_site(out / FOLDER):
+        write_pages(out / FOLDER, {INDEX: text})
 
 
-def _write_pages(site: Path, pages: dict[str, str]) -> None:
+def asset_files(scripts: Iterable[str], libraries: Iterable[str]) -> dict[str, str]:
+    """The style sheet, scripts and libraries of a folder of pages, by their names in it."""
+    written = {f"{ASSETS}/{name}": str(source(name)) for name in ("style.css", *scripts)}
+    return written | {f"{ASSETS}/{Path(name).name}": _library(name) for name in libraries}
+
+
+def write_pages(site: Path, pages: Mapping[str, str]) -> None:
     """Write pages by name, their list first, so that they can be removed later even if this is interrupted."""
     listing = msgspec.json.encode(sorted([*pages, LISTING])).decode()
     for name, text in {LISTING: listing, **pages}.items():
@@ -140,7 +143,7 @@ def _library(name: str) -> str:
     return files("crosscheck.report").joinpath("vendor", name).read_text(encoding="utf-8")
 
 
-def _clear(site: Path) -> bool:
+def clear_site(site: Path) -> bool:
     """Remove the files of an earlier report only; whether there was one."""
     try:
         listed = msgspec.json.decode((site / LISTING).read_bytes(), type=list[str])

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
@@ -14,8 +13,9 @@ from crosscheck.terminal.text import words
 from flexmb.output.listing import Listing, figures, names, prose
 
 if TYPE_CHECKING:
-    from crosscheck.validation.budget import Budget, Listener
+    from crosscheck.validation.budget import Budget
     from crosscheck.validation.measured_set import MeasuredSet
+    from crosscheck.validation.model import Listener
 
 
 def sets_table(sets: Iterable[MeasuredSet]) -> Listing:
@@ -44,7 +44,7 @@ def series_table(budget: Budget) -> Listing:
 
 def points_table(budget: Budget) -> Listing:
     """One row for each point, in the unit of its series, with the input that contributes most."""
-    inputs, sampled = budget.of.content.inputs, budget.sampled
+    sampled = budget.sampled
     more = () if sampled is None else ("sampled",)
     table = Listing(
         *names("series", "conditions"), *figures("D", "S", "E", "u_num", "u_input", *more, "u_D", "E / u_val"),
@@ -52,10 +52,9 @@ def points_table(budget: Budget) -> Listing:
     )  # fmt: skip
     for i, point in enumerate(budget.of.points):
         conditions = " ".join(f"{key}={value:g}" for key, value in point.conditions.items())
-        most = inputs[int(np.argmax(np.abs(budget.by_input[i])))].name if budget.u_input[i] > 0.0 else ""
         columns = [budget.measured, budget.predicted, budget.error, budget.u_num, budget.u_input]
         columns += [*([] if sampled is None else [sampled]), budget.u_D, budget.error / budget.u_val]
-        table.add(point.series, conditions, *(f"{column[i]:.3g}" for column in columns), most)
+        table.add(point.series, conditions, *(f"{column[i]:.3g}" for column in columns), budget.most_by(i))
     return table
 
 

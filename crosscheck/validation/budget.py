@@ -5,37 +5,34 @@ After ASME V&V 20-2009: with the prediction S and the reading D, E = S - D, and 
     u_val^2 = u_num^2 + u_input^2 + u_D^2
 
 of standard deviations. u_num is the change of S by the last refinement. u_input is of first order in the inputs, which
-are taken to be independent: each derivative is a central difference over the input's own deviation and over half of it,
-combined to fourth order; how much both differ is `curved`, and where that is not small, samples (`--samples`) say what
-first order leaves out. A point is within its uncertainty if |E| <= 2 u_val. Otherwise the model is wrong there, by E
+are taken to be independent: its derivatives are exact where the model has them, and held against a difference; all others
+are central differences over the input's own deviation and over half of it, combined to fourth order. How far both are
+apart is `curved`, and where that is not small, samples (`--samples`) say what first order leaves out. A point is within its uncertainty if |E| <= 2 u_val. Otherwise the model is wrong there, by E
 give or take 2 u_val: nothing that was declared explains it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.library.case_error import CaseError
-from crosscheck.validation.measured_set import MODEL, MeasuredSet, Predict, Reading, Series, Standing
+from crosscheck.validation.measured_set import Input, MeasuredSet, Series, Standing
+from crosscheck.validation.model import Listener, Model
 from flexmb.typing import Real
 
 COVERAGE = 2.0  # two standard deviations: 95 of 100 where errors are normal
 SHARE = 0.95  # of the points of a validated series that are within
 NOTICED = 2.0  # a bound so many times beyond the largest error would notice nothing
 
-Listener = Callable[[int, int], None]
-
 
 @dataclass(frozen=True)
 class Budget:
     """Of N points and I inputs, in the units of the series; all arrays are in the order of `points`.
 
-    `by_input` (N,I) is the change of the prediction by one deviation of each input, `curved` (N,I) how far its two
-    differences are apart, and `sampled` (N,) the deviation of the prediction over samples of all inputs, if any.
+    `by_input` (N,I) is the change of the prediction by one deviation of each input, `curved` (N,I) how far the two ways
+    to find it are apart, `exact` for each input whether it is by a derivative of the model's own, and `sampled` (N,) the deviation of the prediction over samples of all inputs, if any.
     """
 
     of: MeasuredSet
@@ -45,6 +42,7 @@ class Budget:
     u_D: Real
     by_input: Real
     curved: Real
+    exact: tuple[bool, ...]
     sampled: Real | None = None
     samples: int = 0
 
@@ -67,6 +65,17 @@ class Budget:
     def within(self) -> NDArray[np.bool_]:
         """(N,) whether E is within the expanded uncertainty; False where either is no number."""
         return np.abs(self.error) <= COVERAGE * self.u_val
+
+    def most_by(self, i: int) -> str:
+        """The input that contributes most to u_input of a point; "" if none does."""
+        row = np.abs(self.by_input[i])
+        return self.of.content.inputs[int(np.argmax(row))].name if np.any(row > 0.0) else ""
+
+    def shares(self, series: str) -> Real:
+        """(I,) part of each input in the sum of u_input^2 over a series; zeros where no input matters."""
+        mine = np.array([point.series == series for point in self.of.points])
+        parts = np.sum(self.by_input[mine] ** 2, axis=0)
+        return parts / np.sum(parts) if np.any(parts > 0.0) else parts
 
     def verdicts(self) -> tuple[SeriesVerdict, ...]:
         """One for each series."""
@@ -121,55 +130,23 @@ class SeriesVerdict:
 def budget(of: MeasuredSet, samples: int = 0, seed: int = 0, listener: Listener = lambda done, of: None) -> Budget:
     """Predict all points at both efforts and at the inputs beside the nominal ones, and at `samples` draws of them.
 
-    CaseError where the model raises, or gives what is not one finite number for each point.
+    CaseError where the model raises, gives what is not one finite number for each point, or has a wrong derivative.
     """
     points, nominal, inputs = of.points, of.nominal, of.content.inputs
-    predict, total, done = of.predict(), 2 + 4 * len(inputs) + samples, 0
-
-    def at(changes: Mapping[str, float], effort: int) -> Real:
-        nonlocal done
-        values = _predicted(of, predict, points, nominal | dict(changes), effort)
-        listener(done := done + 1, total)
-        return values
-
-    coarse, fine = at({}, 0), at({}, 1)
-    by_input, curved = np.zeros((len(points), len(inputs))), np.zeros((len(points), len(inputs)))
-    for i, given in enumerate(inputs):
-        h = given.deviation
-        wide, near = (
-            (at({given.name: given.value + step}, 1) - at({given.name: given.value - step}, 1)) * (h / (2.0 * step))
-            if h > 0.0 else np.zeros(len(points))
-            for step in (h, 0.5 * h)
-        )  # fmt: skip
-        by_input[:, i], curved[:, i] = (4.0 * near - wide) / 3.0, np.abs(near - wide)
-    sampled = None
+    model = Model(of, listener, 2 + 4 * len(inputs) + samples)
+    coarse, fine = model.predictions(points, nominal, 0), model.predictions(points, nominal, 1)
+    changes, sampled = model.changes(points, inputs), None
     if samples:
         drawn = np.random.default_rng(seed)
         draws = [
-            at({each.name: _draw(drawn, each.value, each.deviation, each.kind) for each in inputs}, 1)
-            for _ in range(samples)
+            model.predictions(points, {each.name: _draw(drawn, each) for each in inputs}, 1) for _ in range(samples)
         ]
         sampled = np.std(draws, axis=0, ddof=1) if samples > 1 else np.full(len(points), np.nan)
     measured, u_D = np.array([point.measured for point in points]), np.array([of.deviation(point) for point in points])
-    return Budget(of, fine, measured, np.abs(fine - coarse), u_D, by_input, curved, sampled, samples)
+    return Budget(of, fine, measured, np.abs(fine - coarse), u_D, *changes, sampled, samples)
 
 
-def _draw(drawn: np.random.Generator, value: float, deviation: float, kind: str) -> float:
+def _draw(drawn: np.random.Generator, given: Input) -> float:
     """From a normal distribution, or from an even one of the same deviation."""
-    return value + deviation * float(drawn.normal() if kind == "standard" else drawn.uniform(-(3.0**0.5), 3.0**0.5))
-
-
-def _predicted(
-    of: MeasuredSet, predict: Predict, points: Sequence[Reading], inputs: Mapping[str, float], effort: int
-) -> Real:
-    where = f"{of.folder / MODEL}: predict at effort {effort}"
-    try:
-        answer = np.asarray(predict(points, dict(inputs), effort), dtype=np.float64)
-    except Exception as error:  # the file is anybody's
-        raise CaseError(f"{where}: {type(error).__name__}: {error}") from error
-    if answer.shape != (len(points),):
-        raise CaseError(f"{where}: it gave an array {answer.shape} for {len(points)} points")
-    if not np.all(np.isfinite(answer)):
-        first = points[int(np.argmin(np.isfinite(answer)))]
-        raise CaseError(f"{where}: what it gave for {first.series}, {dict(first.conditions)}, is no finite number")
-    return answer
+    unit = drawn.normal() if given.kind == "standard" else drawn.uniform(-(3.0**0.5), 3.0**0.5)
+    return given.value + given.deviation * float(unit)

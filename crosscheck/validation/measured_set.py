@@ -5,14 +5,17 @@ A folder holds `measured.toml` (source, inputs and series), `points.csv` (the re
     predict(points, inputs, effort) -> one number for each point, in the unit of its series
 
 `points` is a tuple of `Reading`, `inputs` a dict of the values of all inputs by name, and `effort` 0 or 1: the
-numerical error at 1 is to be several times smaller, by more modes or polynomials or by a tighter integration.
+numerical error at 1 is to be several times smaller, by more modes or polynomials or by a tighter integration. It may
+also have exact derivatives of its predictions, by all inputs or by some:
+
+    derivatives(points, inputs, effort) -> a dict of one number for each point, by the names of inputs
 """
 
 from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite, sqrt
 from pathlib import Path
@@ -22,7 +25,6 @@ from typing import Any, Literal, TypeVar
 import msgspec
 
 from crosscheck.library.case_error import CaseError
-from crosscheck.library.code import function_of
 from crosscheck.library.find import shipped_folder
 from crosscheck.library.read_file import struct_of, text_of
 from flexmb.scene.problems import closest
@@ -61,7 +63,8 @@ class Series(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
     The deviation of a reading is `reading` + `relative` times its size. `expect` is "validated" if at least 19 of 20
     points are within their expanded uncertainty, and `within` bounds the largest error, relative to `size` (by
-    default the largest reading of the series).
+    default the largest reading of the series). A chart has the condition `over` across, and a curve for each
+    combination of the conditions `by`.
     """
 
     name: str
@@ -75,6 +78,8 @@ class Series(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     within: float
     size: float | None = None
     reason: str = ""
+    over: str = ""
+    by: tuple[str, ...] = ()
 
 
 class MeasuredFile(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -102,7 +107,6 @@ class Reading:
     measured: float
 
 
-Predict = Callable[[Sequence[Reading], Mapping[str, float], int], Sequence[float]]
 T = TypeVar("T")
 
 
@@ -129,11 +133,6 @@ class MeasuredSet:
         """The inputs as the source has them."""
         return {given.name: given.value for given in self.content.inputs}
 
-    def predict(self) -> Predict:
-        """The function of `model.py`; CaseError if there is none, or if user code is forbidden."""
-        takes, gives = "points, inputs, effort", "a number for each point"
-        return function_of(self.folder / MODEL, "predict", takes, gives, "it predicts the points")
-
 
 def measured_folder() -> Path:
     """The folder of the shipped sets."""
@@ -156,6 +155,17 @@ def find_set(word: str) -> MeasuredSet:
             "`crosscheck validate list` shows them"
         )
     return read_set(measured_folder() / word)
+
+
+def find_sets(words: Sequence[str]) -> list[MeasuredSet]:
+    """The sets of some words, each once; `all` or `list` alone are all shipped ones. CaseError as `find_set`, and where
+    two folders have one name, by which results and pages are known."""
+    found = [find_set(word) for word in (shipped_sets() if list(words) in (["all"], ["list"]) else dict.fromkeys(words))]
+    folders = dict[str, Path]()
+    for each in found:
+        if folders.setdefault(each.name, each.folder) != each.folder:
+            raise CaseError(f"{folders[each.name]} and {each.folder} have the same name: rename one, or ask for one")
+    return list({each.name: each for each in found}.values())
 
 
 def read_set(folder: Path) -> MeasuredSet:
@@ -229,12 +239,21 @@ def _points(file: Path, content: MeasuredFile) -> tuple[Reading, ...]:
         measured = numbers.pop(MEASURED)
         points.append(Reading(cells[SERIES], MappingProxyType(numbers), measured))
     for series in content.series:
+        _refuse_unknown_conditions(file, series, set(head) - {SERIES, MEASURED})
+        if series.over and any(point.series == series.name and series.over not in point.conditions for point in points):
+            raise CaseError(f'{file}: a reading of series "{series.name}" has no {series.over}, over which it is drawn')
         readings = [point.measured for point in points if point.series == series.name]
         if not readings:
             raise CaseError(f'{file}: series "{series.name}" has no point: leave it out of {FILE}')
         if series.size is None and not any(readings):
             raise CaseError(f'{file}: all readings of series "{series.name}" are 0: give its size in {FILE}')
     return tuple(points)
+
+
+def _refuse_unknown_conditions(file: Path, series: Series, known: set[str]) -> None:
+    for name in (*([series.over] if series.over else []), *series.by):
+        if name not in known:
+            raise CaseError(f'{file}: series "{series.name}" is drawn by {name}, no column here: {closest(name, known)}')
 
 
 def _number(file: Path, line: int, key: str, text: str) -> float:

@@ -17,9 +17,13 @@ import pytest
 from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.library.find import resolve
 from crosscheck.report import write_all
+from crosscheck.report.measured import write_measured
 from crosscheck.running.scheduler import Limits
 from crosscheck.running.sweep import sweep
+from crosscheck.validation.budget import budget
+from crosscheck.validation.measured_set import read_set
 from tests.crosscheck.report.sessions import MANY, session
+from tests.crosscheck.validation.test_budget import made
 
 webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed: the extra `browser` has it")
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None)
@@ -323,3 +327,17 @@ def hues(picture: np.ndarray) -> list[int]:
     )
     counts = np.bincount(np.round(angle * 2).astype(int) % 12, minlength=12)
     return [i for i in range(12) if counts[i] > high.size / 2000]
+
+
+@pytest.mark.parametrize("size", [WIDE, NARROW])
+def test_a_measured_set_is_drawn(reader: Reader, tmp_path: Path, size: tuple[int, int]) -> None:
+    """Its three charts, with bars and bands, fit the window; nothing is complained of."""
+    index = write_measured([budget(read_set(made(tmp_path)))], "one set", tmp_path / "out")
+    reader.open(next(file for file in index.parent.glob("*.html") if file != index), size)
+    for i in range(3):
+        reader.run("document.querySelectorAll('.plot')[arguments[0]].scrollIntoView({block: 'center'})", i)
+        reader.wait(f"return document.querySelectorAll('.plot')[{i}].classList.contains('drawn')")
+    assert reader.run("return document.querySelectorAll('.errorbar').length") == 3
+    assert reader.run("return document.querySelectorAll('.bars .point').length") == 2
+    assert reader.run("return document.documentElement.scrollWidth") <= size[0]
+    assert not reader.errors()

@@ -13,7 +13,8 @@ from crosscheck.cli.common import app
 from crosscheck.library.case_error import CaseError
 from crosscheck.validation.budget import budget
 from crosscheck.validation.document import document
-from crosscheck.validation.measured_set import MeasuredSet, find_set, read_set, shipped_sets
+from crosscheck.validation.measured_set import MeasuredSet, find_set, find_sets, read_set, shipped_sets
+from crosscheck.validation.model import Model
 from flexmb.scene.user_code import no_user_code
 
 HEAD = """\
@@ -59,6 +60,10 @@ reason = "so"
 LINE = """\
 def predict(points, inputs, effort):
     return [inputs["slope"] * p.conditions["x"] + inputs["offset"] + (0.0 if effort else 0.02) for p in points]
+"""
+SLOPE = """
+def derivatives(points, inputs, effort):
+    return {"slope": [p.conditions["x"] for p in points]}
 """
 X = np.array([1.0, 2.0, 5.0])
 
@@ -112,6 +117,33 @@ def test_derivatives_are_of_fourth_order(tmp_path: Path) -> None:
     h = 0.1
     np.testing.assert_allclose(known.by_input[:, 0] - exact, -0.25 * h**5 * X, rtol=1e-6)
     assert np.all(known.curved[:, 0] > 1e-3 * exact)
+
+
+def test_an_exact_derivative_takes_the_place_of_differences(tmp_path: Path) -> None:
+    """By the inputs that the model has derivatives by; the same budget, and half the evaluations by such an input."""
+    counted = list[int]()
+    exact = budget(read_set(made(tmp_path, model=LINE + SLOPE)), 500, listener=lambda done, of: counted.append(of))
+    assert exact.exact == (True, False) and counted[-1] == len(counted) == 2 + 1 + 2 + 4 + 500
+    np.testing.assert_allclose(exact.by_input, budget(read_set(made(tmp_path))).by_input, rtol=1e-12)
+    assert exact.sampled is not None
+    np.testing.assert_allclose(exact.sampled, exact.u_input, rtol=5.0 / np.sqrt(1000.0))
+
+
+@pytest.mark.parametrize(
+    ("derivative", "word"),
+    [
+        (SLOPE.replace("x\"]", "x\"] * 1.02"), 'by "slope" a deviation changes line'),
+        (SLOPE.replace("slope", "offset"), 'by "offset" a deviation changes line'),
+        (SLOPE.replace("slope", "slop"), 'did you mean "slope"'),
+        (SLOPE.replace('p.conditions["x"]', 'float("nan")'), "is no finite number"),
+        (SLOPE.replace("for p in points", "for p in points[1:]"), "an array \\(2,\\) for 3 points"),
+        ("\ndef derivatives(points, inputs, effort):\n    return [1.0]\n", "give a dict"),
+    ],
+)
+def test_a_wrong_derivative_is_refused_by_name(tmp_path: Path, derivative: str, word: str) -> None:
+    """Two per cent suffice; what the reading hides by a hundred would not matter."""
+    with pytest.raises(CaseError, match=word):
+        budget(read_set(made(tmp_path, model=LINE + derivative)))
 
 
 @pytest.mark.parametrize(
@@ -169,6 +201,17 @@ def test_one_point_in_twenty_may_be_outside(tmp_path: Path) -> None:
             },
             "are 0: give its size",
         ),
+        (
+            {"measured_toml": HEAD + SERIES.format(expect="validated", within=1) + 'over = "y"'},
+            "is drawn by y, no column here",
+        ),
+        (
+            {
+                "measured_toml": HEAD + SERIES.format(expect="validated", within=1) + 'over = "x"',
+                "points_csv": "series,x,measured\nline,,2\n",
+            },
+            "has no x, over which it is drawn",
+        ),
         ({"points_csv": ""}, "columns series and measured"),
         ({"points_csv": "series,x,measured\nline,1," + 140_000 * "1"}, "field larger than field limit"),
         ({"measured_toml": HEAD + INPUTS}, "series"),
@@ -201,7 +244,7 @@ def test_a_wrong_file_is_refused_by_name(tmp_path: Path, files: dict[str, str], 
 def test_code_may_be_forbidden(tmp_path: Path) -> None:
     """In a block of Python, and by the option."""
     with no_user_code(), pytest.raises(CaseError, match="user code was forbidden"):
-        read_set(made(tmp_path)).predict()
+        Model(read_set(made(tmp_path)))
 
 
 def test_the_command_line(tmp_path: Path) -> None:
@@ -226,17 +269,25 @@ def test_a_document_has_every_part(tmp_path: Path) -> None:
     assert content["points"][0]["by_input"].keys() == {"slope", "offset"}
 
 
+def test_two_folders_of_one_name_are_not_mixed_up(tmp_path: Path) -> None:
+    """Results and pages are known by the name of the folder."""
+    folders = [str(made(place)) for each in ("a", "b") if not (place := tmp_path / each / "line").mkdir(parents=True)]
+    with pytest.raises(CaseError, match="have the same name"):
+        find_sets(folders)
+    assert len(find_sets([folders[0], f"{folders[0]}/../line"])) == 1
+
+
 @pytest.mark.parametrize("name", shipped_sets())
 def test_shipped_sets_are_whole(name: str) -> None:
     """They read, say what they left out, and load their model."""
     known: MeasuredSet = find_set(name)
-    assert known.content.left_out and known.content.sources and callable(known.predict())
+    assert known.content.left_out and known.content.sources and Model(known)
 
 
 def test_a_shipped_model_predicts() -> None:
     """The one that takes least, at its lower effort: speeds after a despin, off by 15 % of the speed before at most."""
     known = find_set("yoyo_despin")
-    predicted = np.array(known.predict()(known.points, known.nominal, 0))
+    predicted = Model(known).predictions(known.points, known.nominal, 0)
     before = np.array([point.conditions["speed_before_rpm"] for point in known.points])
     assert np.all(np.abs(predicted - [point.measured for point in known.points]) < 0.15 * before)
 
