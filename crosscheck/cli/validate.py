@@ -44,8 +44,8 @@ def validate(
     derivatives of the prediction) and of the reading (u_D). It is within if |E| is at most 2 u_val. A series with 19 of
     20 points within is *validated within u_val*; otherwise its model is wrong by what is shown. `--verbose` has every
     point, and which input its uncertainty comes from. `--samples 200` draws the inputs and shows how far u_input, which
-    is of first order, is from the deviation of the samples. `--out FOLDER` writes a page of each set, with charts, and all
-    numbers as JSON.
+    is of first order, is from the deviation of the samples. `--out FOLDER` writes a page of each set, with charts, and
+    all numbers as JSON.
 
     A set is a folder with `measured.toml`, `points.csv` and `model.py`; `docs/validation.md` says what they hold.
 
@@ -56,7 +56,7 @@ def validate(
     `crosscheck validate all --json`
     """
     with in_one_line() if out is None else sole_writer(out):
-        from crosscheck.terminal.measured import points_table, series_table, sets_table, told_progress
+        from crosscheck.terminal.measured import identified_table, points_table, series_table, sets_table, told_progress
         from crosscheck.validation.budget import budget
         from crosscheck.validation.document import document
         from crosscheck.validation.measured_set import find_sets
@@ -76,6 +76,8 @@ def validate(
             with told_progress(console, measured.name) as listener:
                 budgets.append(budget(measured, samples, seed, listener))
             console.print(series_table(budgets[-1]))
+            if measured.content.fit:
+                console.print(identified_table(budgets[-1]))
             if verbose:
                 console.print(points_table(budgets[-1]))
         verdicts = [verdict for of_set in budgets for verdict in of_set.verdicts()]

@@ -28,17 +28,31 @@ def sets_table(sets: Iterable[MeasuredSet]) -> Listing:
 
 def series_table(budget: Budget) -> Listing:
     """One row for each series; errors and uncertainties are relative to its size."""
+    split = budget.of.content.split
+    along = (f"horizon, {split.horizon}",) if split is not None and split.horizon else ()
     table = Listing(
-        *names("series", "verdict"), *figures("within", "E rms", "E largest", "u_val rms"),
+        *names("series", "verdict"), *figures("within", "E rms", "E largest", "u_val rms", *along),
         *prose("not as the file says"), title=budget.of.content.title,
     )  # fmt: skip
     for verdict in budget.verdicts():
         standing = "validated within u_val" if verdict.standing == "validated" else "model error"
-        numbers = (f"{value:.2%}" for value in (verdict.rms, verdict.largest, verdict.u_val))
+        numbers = [f"{value:.2%}" for value in (verdict.rms, verdict.largest, verdict.u_val)]
+        numbers += [f"{verdict.horizon:.3g}" for _ in along]
         table.add(
             verdict.series.name, words(standing, "green" if verdict.ok else "red"),
             f"{verdict.within} of {verdict.points}", *numbers, verdict.fault,
         )  # fmt: skip
+    return table
+
+
+def identified_table(budget: Budget) -> Listing:
+    """The inputs that were identified, as they were found, and their deviations."""
+    found, content = budget.identified, budget.of.content
+    title = "" if found is None else f"by {found.readings} readings, misfit {found.misfit:.2f}"
+    table = Listing(*names("identified"), *figures("value", "deviation"), *names("unit"), title=title)
+    for given in content.inputs:
+        if given.name in content.fit:
+            table.add(given.name, f"{given.value:.5g}", f"{given.deviation:.2g}", given.unit)
     return table
 
 

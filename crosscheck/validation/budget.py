@@ -5,25 +5,32 @@ After ASME V&V 20-2009: with the prediction S and the reading D, E = S - D, and 
     u_val^2 = u_num^2 + u_input^2 + u_D^2
 
 of standard deviations. u_num is the change of S by the last refinement. u_input is of first order in the inputs, which
-are taken to be independent: its derivatives are exact where the model has them, and held against a difference; all others
-are central differences over the input's own deviation and over half of it, combined to fourth order. How far both are
-apart is `curved`, and where that is not small, samples (`--samples`) say what first order leaves out. A point is within its uncertainty if |E| <= 2 u_val. Otherwise the model is wrong there, by E
-give or take 2 u_val: nothing that was declared explains it.
+are taken to be independent: its derivatives are exact where the model has them, and held against a difference; all
+others are central differences over the input's own deviation and over half of it, combined to fourth order. How far
+both are apart is `curved`, and where that is not small, samples (`--samples`) say what first order leaves out. A point
+is within its uncertainty if |E| <= 2 u_val. Otherwise the model is wrong there, by E give or take 2 u_val: nothing that
+was declared explains it.
+
+Where a file names inputs to `fit`, they are identified by a part of the readings (`identification`), and u_input of the
+others is that of the posterior covariance of all inputs.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from crosscheck.validation.identification import Identified, identified
 from crosscheck.validation.measured_set import Input, MeasuredSet, Series, Standing
 from crosscheck.validation.model import Listener, Model
 from flexmb.typing import Real
 
 COVERAGE = 2.0  # two standard deviations: 95 of 100 where errors are normal
 SHARE = 0.95  # of the points of a validated series that are within
+FAR = 3.0  # deviations beyond which a reading is by chance once in 370: the horizon ends there
 NOTICED = 2.0  # a bound so many times beyond the largest error would notice nothing
 
 
@@ -31,8 +38,9 @@ NOTICED = 2.0  # a bound so many times beyond the largest error would notice not
 class Budget:
     """Of N points and I inputs, in the units of the series; all arrays are in the order of `points`.
 
-    `by_input` (N,I) is the change of the prediction by one deviation of each input, `curved` (N,I) how far the two ways
-    to find it are apart, `exact` for each input whether it is by a derivative of the model's own, and `sampled` (N,) the deviation of the prediction over samples of all inputs, if any.
+    `by_input` (N,I) is the change of the prediction by one deviation of each input, `curved` (N,I) how far the two
+    ways to find it are apart, `exact` for each input whether it is by a derivative of the model's own, and `sampled`
+    (N,) the deviation of the prediction over samples of all inputs, if any.
     """
 
     of: MeasuredSet
@@ -45,6 +53,7 @@ class Budget:
     exact: tuple[bool, ...]
     sampled: Real | None = None
     samples: int = 0
+    identified: Identified | None = None
 
     @property
     def error(self) -> Real:
@@ -54,7 +63,13 @@ class Budget:
     @property
     def u_input(self) -> Real:
         """(N,) standard deviation of the prediction by the inputs."""
-        return np.sqrt(np.sum(self.by_input**2, axis=1))
+        return np.sqrt(np.maximum(np.sum(self.parts, axis=1), 0.0))
+
+    @property
+    def parts(self) -> Real:
+        """(N,I) what each input adds to u_input^2; inputs that were identified together may take away, too."""
+        found = self.identified
+        return self.by_input * (self.by_input if found is None else self.by_input @ found.correlation)
 
     @property
     def u_val(self) -> Real:
@@ -68,14 +83,14 @@ class Budget:
 
     def most_by(self, i: int) -> str:
         """The input that contributes most to u_input of a point; "" if none does."""
-        row = np.abs(self.by_input[i])
+        row = self.parts[i]
         return self.of.content.inputs[int(np.argmax(row))].name if np.any(row > 0.0) else ""
 
     def shares(self, series: str) -> Real:
         """(I,) part of each input in the sum of u_input^2 over a series; zeros where no input matters."""
         mine = np.array([point.series == series for point in self.of.points])
-        parts = np.sum(self.by_input[mine] ** 2, axis=0)
-        return parts / np.sum(parts) if np.any(parts > 0.0) else parts
+        parts = np.sum(self.parts[mine], axis=0)
+        return parts / np.sum(parts) if np.sum(parts) > 0.0 else parts
 
     def verdicts(self) -> tuple[SeriesVerdict, ...]:
         """One for each series."""
@@ -87,10 +102,20 @@ class Budget:
         size = series.size or float(np.max(np.abs(self.measured[mine])))
         largest, u_val = float(np.max(np.abs(error))) / size, float(np.sqrt(np.mean(self.u_val[mine] ** 2))) / size
         standing: Standing = "validated" if np.mean(within) >= SHARE else "model error"
-        return SeriesVerdict(
-            series, standing, int(np.sum(within)), len(within), float(np.sqrt(np.mean(error**2))) / size, largest,
-            u_val, self._fault(series, standing, largest, u_val, size),
-        )  # fmt: skip
+        horizon = self._horizon(mine)
+        fault = self._fault(series, standing, largest, u_val, size) or _horizon_fault(series, horizon)
+        rms = float(np.sqrt(np.mean(error**2))) / size
+        return SeriesVerdict(series, standing, int(np.sum(within)), len(within), rms, largest, u_val, fault, horizon)
+
+    def _horizon(self, mine: NDArray[np.bool_]) -> float | None:
+        """The largest value of the horizon's condition before the first reading that is far outside; None without."""
+        split = self.of.content.split
+        if split is None or not split.horizon:
+            return None
+        at = np.array([point.conditions[split.horizon] for point, own in zip(self.of.points, mine, strict=True) if own])
+        far = ~(np.abs(self.error[mine]) <= FAR * self.u_val[mine])
+        inside = at[at < np.min(at[far])] if np.any(far) else at
+        return float(np.max(inside)) if len(inside) else float(np.min(at)) if split.to is None else split.to
 
     def _fault(self, series: Series, standing: Standing, largest: float, u_val: float, size: float) -> str:
         """What is not as the file says; "" if nothing."""
@@ -108,9 +133,20 @@ class Budget:
         return ""
 
 
+def _horizon_fault(series: Series, horizon: float | None) -> str:
+    """What is not as the file says of a horizon; "" if nothing."""
+    if series.horizon is None or horizon is None:
+        return ""
+    low, high = series.horizon
+    if not low <= horizon <= high:
+        return f"it leaves its band after {horizon:.3g}, and {low:g} to {high:g} was expected"
+    return f"its horizon from {low:g} would notice nothing: it is {horizon:.3g}" if horizon > NOTICED * low else ""
+
+
 @dataclass(frozen=True)
 class SeriesVerdict:
-    """Of one series: its standing, how many points are within, errors relative to its size, and what is unexpected."""
+    """Of one series: its standing, how many points are within, errors relative to its size, what is unexpected, and how
+    far it is predicted, in the unit of the horizon's condition, if the file names one."""
 
     series: Series
     standing: Standing
@@ -120,6 +156,7 @@ class SeriesVerdict:
     largest: float
     u_val: float
     fault: str
+    horizon: float | None = None
 
     @property
     def ok(self) -> bool:
@@ -130,23 +167,30 @@ class SeriesVerdict:
 def budget(of: MeasuredSet, samples: int = 0, seed: int = 0, listener: Listener = lambda done, of: None) -> Budget:
     """Predict all points at both efforts and at the inputs beside the nominal ones, and at `samples` draws of them.
 
-    CaseError where the model raises, gives what is not one finite number for each point, or has a wrong derivative.
+    Inputs of `fit` are identified first: then the points are those that are left to predict, and the inputs as found.
+    CaseError where the model raises, gives what is not one finite number for each point, or has a wrong derivative, and
+    where readings do not determine what is to be fitted.
     """
+    found = identified(of, listener) if of.content.fit else None
+    of = of if found is None else found.of
     points, nominal, inputs = of.points, of.nominal, of.content.inputs
     model = Model(of, listener, 2 + 4 * len(inputs) + samples)
     coarse, fine = model.predictions(points, nominal, 0), model.predictions(points, nominal, 1)
     changes, sampled = model.changes(points, inputs), None
     if samples:
         drawn = np.random.default_rng(seed)
-        draws = [
-            model.predictions(points, {each.name: _draw(drawn, each) for each in inputs}, 1) for _ in range(samples)
-        ]
+        draws = [model.predictions(points, _draw(drawn, inputs, found), 1) for _ in range(samples)]
         sampled = np.std(draws, axis=0, ddof=1) if samples > 1 else np.full(len(points), np.nan)
     measured, u_D = np.array([point.measured for point in points]), np.array([of.deviation(point) for point in points])
-    return Budget(of, fine, measured, np.abs(fine - coarse), u_D, *changes, sampled, samples)
+    return Budget(of, fine, measured, np.abs(fine - coarse), u_D, *changes, sampled, samples, found)
 
 
-def _draw(drawn: np.random.Generator, given: Input) -> float:
-    """From a normal distribution, or from an even one of the same deviation."""
-    unit = drawn.normal() if given.kind == "standard" else drawn.uniform(-(3.0**0.5), 3.0**0.5)
-    return given.value + given.deviation * float(unit)
+def _draw(drawn: np.random.Generator, inputs: Sequence[Input], found: Identified | None) -> dict[str, float]:
+    """Inputs from normal distributions, or from even ones of the same deviation; correlated as they were identified."""
+    if found is None:
+        units = [
+            drawn.normal() if each.kind == "standard" else drawn.uniform(-(3.0**0.5), 3.0**0.5) for each in inputs
+        ]
+    else:
+        units = drawn.multivariate_normal(np.zeros(len(inputs)), found.correlation).tolist()
+    return {each.name: each.value + each.deviation * unit for each, unit in zip(inputs, units, strict=True)}

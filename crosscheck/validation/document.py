@@ -26,6 +26,7 @@ def document(budget: Budget) -> dict[str, Any]:
             }
             for each, exact in zip(content.inputs, budget.exact, strict=True)
         ],
+        "identified": _identified(budget),
         "points": [
             {
                 "series": point.series, "conditions": dict(point.conditions), "measured": point.measured,
@@ -40,6 +41,17 @@ def document(budget: Budget) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def _identified(budget: Budget) -> dict[str, Any] | None:
+    """By how many readings which inputs were identified, and what is left there; None where nothing was."""
+    found, content = budget.identified, budget.of.content
+    if found is None:
+        return None
+    return {
+        "inputs": list(content.fit), "readings": found.readings, "misfit": found.misfit,
+        "correlation": found.correlation.tolist(), "horizon": content.split.horizon if content.split else "",
+    }  # fmt: skip
+
+
 def _series(budget: Budget, verdict: SeriesVerdict) -> dict[str, Any]:
     """What a series is, what came out, and the share of each input in its u_input squared."""
     series = verdict.series
@@ -48,5 +60,5 @@ def _series(budget: Budget, verdict: SeriesVerdict) -> dict[str, Any]:
         "reading": series.reading, "relative": series.relative, "stated": series.stated, "read_why": series.why,
         "standing": verdict.standing, "reason": series.reason, "ok": verdict.ok, "fault": verdict.fault,
         "points": verdict.points, "within": verdict.within, "rms": verdict.rms, "largest": verdict.largest,
-        "u_val": verdict.u_val, "shares": budget.shares(series.name).tolist(),
+        "u_val": verdict.u_val, "horizon": verdict.horizon, "shares": budget.shares(series.name).tolist(),
     }  # fmt: skip

@@ -64,7 +64,7 @@ class Series(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     The deviation of a reading is `reading` + `relative` times its size. `expect` is "validated" if at least 19 of 20
     points are within their expanded uncertainty, and `within` bounds the largest error, relative to `size` (by
     default the largest reading of the series). A chart has the condition `over` across, and a curve for each
-    combination of the conditions `by`.
+    combination of the conditions `by`. `horizon` has the bounds between which the horizon of the split is expected.
     """
 
     name: str
@@ -80,10 +80,27 @@ class Series(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     reason: str = ""
     over: str = ""
     by: tuple[str, ...] = ()
+    horizon: tuple[float, float] | None = None
+
+
+class Split(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Which readings identify the inputs of `fit`: those whose `condition` is at most `to`, or is one of `among`.
+
+    `horizon` is a condition, such as the time: a series is then predicted up to the largest value of it before the
+    first reading that is far outside.
+    """
+
+    condition: str
+    to: float | None = None
+    among: tuple[float, ...] = ()
+    horizon: str = ""
 
 
 class MeasuredFile(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What `measured.toml` holds. `fitted` says which numbers of the model were fitted to these very readings."""
+    """What `measured.toml` holds. `fitted` says which numbers of the model were fitted to these very readings.
+
+    `fit` names inputs that are identified by the readings of `split`; all others are predicted.
+    """
 
     title: str
     physics: str
@@ -94,6 +111,8 @@ class MeasuredFile(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     digitised: str
     fitted: str
     left_out: str
+    fit: tuple[str, ...] = ()
+    split: Split | None = None
     inputs: tuple[Input, ...] = ()
     series: tuple[Series, ...] = ()
 
@@ -128,6 +147,14 @@ class MeasuredSet:
         series = self.series(point.series)
         return series.reading + series.relative * abs(point.measured)
 
+    def identifies(self, point: Reading) -> bool:
+        """Whether a reading is one by which inputs are identified, and which is not predicted."""
+        split = self.content.split
+        if split is None or split.condition not in point.conditions:
+            return False
+        value = point.conditions[split.condition]
+        return value in split.among or (split.to is not None and value <= split.to)
+
     @property
     def nominal(self) -> dict[str, float]:
         """The inputs as the source has them."""
@@ -160,7 +187,8 @@ def find_set(word: str) -> MeasuredSet:
 def find_sets(words: Sequence[str]) -> list[MeasuredSet]:
     """The sets of some words, each once; `all` or `list` alone are all shipped ones. CaseError as `find_set`, and where
     two folders have one name, by which results and pages are known."""
-    found = [find_set(word) for word in (shipped_sets() if list(words) in (["all"], ["list"]) else dict.fromkeys(words))]
+    names = shipped_sets() if list(words) in (["all"], ["list"]) else dict.fromkeys(words)
+    found = [find_set(name) for name in names]
     folders = dict[str, Path]()
     for each in found:
         if folders.setdefault(each.name, each.folder) != each.folder:
@@ -172,8 +200,37 @@ def read_set(folder: Path) -> MeasuredSet:
     """Read and check a folder; CaseError names file, place and remedy."""
     folder = folder.resolve()
     content = _content(folder / FILE)
-    points = _points(folder / POINTS, content)
-    return MeasuredSet(folder.name, folder, content, points)
+    known = MeasuredSet(folder.name, folder, content, _points(folder / POINTS, content))
+    _refuse_bad_split(known)
+    return known
+
+
+def _refuse_bad_split(known: MeasuredSet) -> None:
+    """CaseError where inputs are to be identified that are none, or by no reading, or nothing is left to predict."""
+    content, file = known.content, known.folder / FILE
+    split, inputs = content.split, {given.name: given for given in content.inputs}
+    if (split is None) != (not content.fit):
+        raise CaseError(f"{file}: fit and [split] belong together: give both, or none")
+    if split is None:
+        for series in content.series:
+            if series.horizon is not None:
+                raise CaseError(f'{file}: series "{series.name}" has a horizon, and there is no [split]')
+        return
+    for name in content.fit:
+        if name not in inputs:
+            raise CaseError(f'{file}: fit: "{name}" is no input: {closest(name, inputs)}')
+        if inputs[name].deviation == 0.0:
+            raise CaseError(f'{file}: fit: input "{name}" has width 0: give a step by which its search begins')
+    if not any(known.identifies(point) for point in known.points):
+        raise CaseError(f"{file}: split: no reading has a {split.condition} that is meant: nothing is identified")
+    for series in content.series:
+        rest = [point for point in known.points if point.series == series.name and not known.identifies(point)]
+        if not rest:
+            raise CaseError(f'{file}: split: no reading of series "{series.name}" is left to predict')
+        if split.horizon and any(split.horizon not in point.conditions for point in rest):
+            raise CaseError(f'{file}: split: a reading of series "{series.name}" has no {split.horizon}')
+        if series.horizon is not None and not split.horizon:
+            raise CaseError(f'{file}: series "{series.name}" has a horizon: say in [split] along which condition')
 
 
 def _content(file: Path) -> MeasuredFile:
@@ -253,7 +310,8 @@ def _points(file: Path, content: MeasuredFile) -> tuple[Reading, ...]:
 def _refuse_unknown_conditions(file: Path, series: Series, known: set[str]) -> None:
     for name in (*([series.over] if series.over else []), *series.by):
         if name not in known:
-            raise CaseError(f'{file}: series "{series.name}" is drawn by {name}, no column here: {closest(name, known)}')
+            near = closest(name, known)
+            raise CaseError(f'{file}: series "{series.name}" is drawn by {name}, no column here: {near}')
 
 
 def _number(file: Path, line: int, key: str, text: str) -> float:

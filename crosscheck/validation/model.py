@@ -14,7 +14,7 @@ from crosscheck.validation.measured_set import MODEL, Input, MeasuredSet, Readin
 from flexmb.scene.problems import closest
 from flexmb.typing import Real
 
-TRIED = 0.125  # part of a deviation over which the difference is formed that an exact derivative is held against
+TRIED = 1.0 / 64.0  # part of a deviation over which the difference is formed that an exact derivative is held against
 WRONG = 0.01  # how far both may be apart: part of the largest in the series, and of the deviation of the reading
 
 Listener = Callable[[int, int], None]
@@ -81,25 +81,38 @@ class Model:
         self.expected -= 2 * len(exact)
         by_input, curved = np.zeros((len(points), len(inputs))), np.zeros((len(points), len(inputs)))
 
-        def difference(each: Input, part: float) -> Real:
-            step = part * each.deviation
-            high, low = (
-                self.predictions(points, values | {each.name: each.value + sign * step}, 1) for sign in (1.0, -1.0)
-            )
-            return (high - low) / (2.0 * part)
-
         for i, each in enumerate(inputs):
             if each.deviation == 0.0:
                 continue
             if each.name in exact:
                 by_input[:, i] = exact[each.name] * each.deviation
-                tried = difference(each, TRIED)
+                tried = self._difference(points, values, each, TRIED)
                 curved[:, i] = np.abs(tried - by_input[:, i])
                 self._refuse_wrong(each, points, by_input[:, i], tried)
             else:
-                wide, near = difference(each, 1.0), difference(each, 0.5)
+                wide, near = (self._difference(points, values, each, part) for part in (1.0, 0.5))
                 by_input[:, i], curved[:, i] = (4.0 * near - wide) / 3.0, np.abs(near - wide)
         return Changes(by_input, curved, tuple(each.name in exact for each in inputs))
+
+    def slopes(self, points: Sequence[Reading], inputs: Sequence[Input]) -> Real:
+        """As `changes`, unverified and of second order over a small part of the deviation: what a search needs."""
+        values = {each.name: each.value for each in inputs}
+        exact = self.derivatives(points, values, inputs)
+        columns = [
+            np.zeros(len(points)) if each.deviation == 0.0
+            else exact[each.name] * each.deviation if each.name in exact
+            else self._difference(points, values, each, TRIED)
+            for each in inputs
+        ]  # fmt: skip
+        return np.column_stack(columns)
+
+    def _difference(self, points: Sequence[Reading], values: Mapping[str, float], each: Input, part: float) -> Real:
+        """Central difference over a part of the deviation, for a change by one deviation."""
+        step = part * each.deviation
+        high, low = (
+            self.predictions(points, {**values, each.name: each.value + sign * step}, 1) for sign in (1.0, -1.0)
+        )
+        return (high - low) / (2.0 * part)
 
     def _refuse_wrong(self, each: Input, points: Sequence[Reading], exact: Real, tried: Real) -> None:
         largest = dict[str, float]()

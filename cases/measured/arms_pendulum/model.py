@@ -4,6 +4,7 @@ The readings are absolute angles, zero upright; the hinges' angles are relative.
 """
 
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,22 +27,41 @@ ARMS = {
 
 def predict(points, inputs, effort):
     """Absolute angles (rad)."""
-    pieces = {}
+    return [swung.angles[time][arm] for time, arm, swung in runs(points, inputs, effort)]
+
+
+def derivatives(points, inputs, effort):
+    """Of the angles by all inputs."""
+    found = list(runs(points, inputs, effort, exact=True))
+    return {name: [swung.rates[name][time][arm] for time, arm, swung in found] for name in inputs}
+
+
+def runs(points, inputs, effort, exact=False):
+    """For each point its time, the number of its arm, and the run of its piece."""
+    times, known = {}, {}
     for point in points:
-        pieces.setdefault(point.conditions["piece"], []).append(point)
-    known = {}
-    for piece, own in pieces.items():
-        c, n = own[0].conditions, int(own[0].conditions["arms"])
-        times = tuple(sorted({point.conditions["time_s"] for point in own}))
-        start = tuple(c[f"angle{i}"] + inputs["start angle"] for i in range(1, n + 1))
-        rates = tuple(c[f"rate{i}"] + inputs[f"start rate {i}"] for i in range(1, n + 1))
-        known[piece] = swing(n, start, rates, times, inputs["friction"], inputs["inertia"], effort)
-    return [known[p.conditions["piece"]][p.conditions["time_s"]][int(p.conditions["arm"]) - 1] for p in points]
+        times.setdefault(point.conditions["piece"], set()).add(point.conditions["time_s"])
+    for point in points:
+        c = point.conditions
+        if c["piece"] not in known:
+            n = int(c["arms"])
+            start = tuple(c[f"angle{i}"] + inputs["start angle"] for i in range(1, n + 1))
+            rates = tuple(c[f"rate{i}"] + inputs[f"start rate {i}"] for i in range(1, n + 1))
+            factors = (inputs["friction"], inputs["inertia"])
+            known[c["piece"]] = swing(n, start, rates, tuple(sorted(times[c["piece"]])), *factors, effort, exact)
+        yield c["time_s"], int(c["arm"]) - 1, known[c["piece"]]
+
+
+class Swing(NamedTuple):
+    """Absolute angles (n,) by time, and their derivatives (n,) by input and time."""
+
+    angles: dict
+    rates: dict
 
 
 @cache
-def swing(n, angles, rates, times, friction, inertia, effort):
-    """Absolute angles (n,) by time."""
+def swing(n, angles, rates, times, friction, inertia, effort, exact):
+    """A run from absolute angles and rates; derivatives only if `exact`."""
     masses, centres, lengths, inertias, frictions, g = ARMS[n]
     builder = fm.SceneBuilder("arms", gravity=(0.0, -g, 0.0))
     for i in range(n):
@@ -52,9 +72,30 @@ def swing(n, angles, rates, times, friction, inertia, effort):
             angle=angles[i] - (angles[i - 1] if i else 0.0), rate=rates[i] - (rates[i - 1] if i else 0.0),
             damping=friction * frictions[i], **place,
         )  # fmt: skip
-    run = fm.simulate(
-        builder.scene(), times[-1], samples=[0.0, *times], rtol=(1e-6, 1e-9)[effort], atol=(1e-8, 1e-11)[effort]
-    )
-    names = [name for name, _ in run.q_names]
-    relative = run.q[1:, [names.index(f"hinge {i}.rotation") for i in range(n)]]
-    return dict(zip(times, np.cumsum(relative, axis=1), strict=True))
+    settings = {"samples": [0.0, *times], "rtol": (1e-6, 1e-9)[effort], "atol": (1e-8, 1e-11)[effort]}
+    relative = [f"hinge {i}.rotation" for i in range(n)]
+    if not exact:
+        run = fm.simulate(builder.scene(), times[-1], **settings)
+        names = [name for name, _ in run.q_names]
+        return Swing(by_time(times, run.q[:, [names.index(name) for name in relative]]), {})
+    numbers = {
+        "start angle": {"hinge 0.rotation.angle_rad": 1.0},
+        "friction": {f"hinge {i}.rotation.damping_Nms_rad": frictions[i] for i in range(n)},
+        "inertia": {f"arm {i}.inertia_kg_m2.2.2": inertias[i] for i in range(n)},
+    }
+    for i in range(3):  # the rate of an arm is that of its hinge, less in the next one
+        numbers[f"start rate {i + 1}"] = {
+            f"hinge {k}.rotation.rate_rad_s": sign for k, sign in ((i, 1.0), (i + 1, -1.0)) if k < n and i < n
+        }
+    by = list(dict.fromkeys(path for paths in numbers.values() for path in paths))
+    run = fm.sensitivities(builder.scene(), times[-1], by, relative, **settings)
+    by_input = {
+        name: sum((factor * run.derivatives[:, :, by.index(path)] for path, factor in paths.items()), 0.0 * run.values)
+        for name, paths in numbers.items()
+    }
+    return Swing(by_time(times, run.values), {name: by_time(times, rates) for name, rates in by_input.items()})
+
+
+def by_time(times, relative):
+    """Sums (n,) along the chain by time, of what is given from t = 0."""
+    return dict(zip(times, np.cumsum(relative[1:], axis=1), strict=True))
