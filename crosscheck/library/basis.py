@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from crosscheck.library.case import ReferenceKind
 
 CLOSED_FORM, OWN_EQUATIONS = "a closed form", "equations of its own"
+MANUFACTURED = "a manufactured motion"
+FORMULAS = (CLOSED_FORM, MANUFACTURED, OWN_EQUATIONS)
 WITNESS = "a witness"
 
 
@@ -60,12 +62,14 @@ def basis(routes: Iterable[str]) -> Basis:
     for route in routes:
         name, _, how = route.partition(", ")
         equal = not how.endswith(f", {WITNESS}")
-        what = how.removesuffix(f", {WITNESS}") if name.endswith(".py") else name.partition("-")[0]
+        formula = how.removesuffix(f", {WITNESS}")
+        what = formula if formula in FORMULAS else name.partition("-")[0]
         stands[what] = stands.get(what, False) or equal
-        names += [] if name.endswith(".py") else [name]
-    codes = tuple(code for code in stands if code not in (CLOSED_FORM, OWN_EQUATIONS))
+        names += [] if formula in FORMULAS else [name]
+    codes = tuple(code for code in stands if code not in FORMULAS)
     witnesses = tuple(code for code, equal in stands.items() if not equal)
-    return Basis(CLOSED_FORM in stands, OWN_EQUATIONS in stands, codes, tuple(dict.fromkeys(names)), witnesses)
+    exact = CLOSED_FORM in stands or MANUFACTURED in stands
+    return Basis(exact, OWN_EQUATIONS in stands, codes, tuple(dict.fromkeys(names)), witnesses)
 
 
 def contradiction(kind: ReferenceKind, found: Basis) -> str:

@@ -69,9 +69,13 @@ class ReferenceRoute(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
 
 
 class ReferenceRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The contents of `reference.csv`, its routes, and the engines and channels that are compared with it."""
+    """The contents of `reference.csv`, its routes, and the engines and channels that are compared with it.
+
+    `manufactured` is the command that wrote the reference instead of routes: a prescribed motion, and its loads.
+    """
 
     variant: str
+    manufactured: str = ""
     samples: int | None = None
     horizon_s: float | None = None
     channels: tuple[str, ...] = ()

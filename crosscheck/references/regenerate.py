@@ -62,13 +62,16 @@ def regenerate(
 ) -> Regenerated:
     """Make the reference of a case by its recipe, and write it; with `check` nothing is written.
 
-    CaseError says why there is none: no recipe, a route without result, channels by fewer than two independent routes
-    or by routes that do not agree, a published number that is not met, or a change beyond the stated uncertainty while
-    provenance.toml is as it was.
+    CaseError says why there is none: no recipe, a manufactured motion, a route without result, channels by fewer than
+    two independent routes or by routes that do not agree, a published number that is not met, or a change beyond the
+    stated uncertainty while provenance.toml is as it was.
     """
     recipe = case.run.reference
     if recipe is None:
         raise CaseError(f"{case.folder / 'run.toml'}: it has no table [reference]: add one with two routes at least")
+    if recipe.manufactured:
+        what = "its reference is a manufactured motion, exact, and has no routes"
+        raise CaseError(f"{case.name}: {what}: `{recipe.manufactured}` writes it, into an empty folder")
     try:
         before = load_reference(case.folder) if has_reference(case.folder) else None
         routes = run_routes(case, recipe, _times(case, recipe), provider, limits, scheduler, listener)

@@ -124,22 +124,50 @@ class DenseSystem:
 
         Gyroscopic and centrifugal forces, gravity, elasticity, loads at nodes, connectors between nodes.
         """
-        J, S, now = self._jacobian(q), self._body_jacobians(q), self._seen(q, u, np.zeros(self.nu))
+        return self._inverse(q, u, np.zeros(self.nu), t)
+
+    def needed(self, t: float, q: Real, u: Real, rates: Real) -> Real:
+        """M udot + c - tau (nu,): the generalised forces that a motion needs beside all that the scene has.
+
+        Each inertia point's own m (a - g) and J alpha + w x J w along its Jacobian, without a mass matrix. Of
+        prescribed speeds they are the drive loads.
+        """
+        return self._inverse(q, u, rates, t) + self.armature * rates - self.applied(q, u, t)
+
+    def _inverse(self, q: Real, u: Real, rates: Real, t: float) -> Real:
+        """M udot + c (nu,), without armatures."""
+        motion = self._unit_motions(q)
+        frames = member_frames(self.tree, motion)
+        J, now = _columns(point_frames(self.tree, frames, motion)), self._seen(q, u, rates)
         inertial = self._inertial(now, self._summed)
         c = np.einsum("pai,pa->i", J.linear, inertial.force) + np.einsum("pai,pa->i", J.angular, inertial.torque)
         for k, body in now.first_order.items():
-            c += S[k].T @ body.force(self._gravity)
-        for name, load in self._loads(q, t).items():
-            site = self._site_jacobian(f"load:{name}", q)
-            c -= load.torque[0] @ site.angular[0] + load.force[0] @ site.linear[0]
+            c += body_jacobian(self.tree.members[k], frames[k], self.nu).T @ body.force(self._gravity)
+        sizes = [profile(load.function, t).value for load in self.scene.loads]
+        c -= self.load_columns(q, frames) @ np.array(sizes, dtype=float)
         for name, gripped in self.grips(q, u, t).items():
             for side, wrench in (("a", gripped.on_a), ("b", gripped.on_b)):
-                site = self._site_jacobian(f"connector {side}:{name}", q)
+                site = self._site_columns(f"connector {side}:{name}", frames, motion)
                 c -= wrench[:3] @ site.angular[0] + wrench[3:] @ site.linear[0]
         for member in self.tree.members:
             c[member.u_modes] += member.model.stiffness @ q[member.q_modes]
             c[member.u_modes] += member.model.damping @ u[member.u_modes]
         return c
+
+    def load_columns(self, q: Real, frames: list[MovingFrame] | None = None) -> Real:
+        """(nu,L) generalised forces of the scene's L loads at nodes, each of size one.
+
+        `frames` are those of the members in unit motions, if they are known.
+        """
+        motion, found = self._unit_motions(q), np.zeros((self.nu, len(self.scene.loads)))
+        if not self.scene.loads:
+            return found
+        frames = member_frames(self.tree, motion) if frames is None else frames
+        for i, load in enumerate(self.scene.loads):
+            site = seat_frame(self.tree, frames, *self.tree.sites[f"load:{load.name}"], motion)
+            J, along = _columns(site), _direction(load, site.rotation.value[0, 0])
+            found[:, i] = along @ (J.angular[0] if load.type == "torque" else J.linear[0])
+        return found
 
     def applied(self, q: Real, u: Real, t: float = 0.0) -> Real:
         """tau (nu,) of springs, dampers and motors of hinges, point masses and wheels."""
@@ -158,11 +186,13 @@ class DenseSystem:
 
     def grips(self, q: Real, u: Real, t: float = 0.0) -> dict[str, Grip]:
         """Loads of the connectors between nodes, by name."""
+        between = [connector for connector in self.scene.connectors if isinstance(connector, BetweenNodes)]
+        if not between:
+            return {}
         now, found = self._at(q, u), {}
-        for connector in self.scene.connectors:
-            if isinstance(connector, BetweenNodes):
-                a, b = (now.seat(*self.tree.sites[f"connector {side}:{connector.name}"]) for side in "ab")
-                found[connector.name] = grip(connector, a, b, t)
+        for connector in between:
+            a, b = (now.seat(*self.tree.sites[f"connector {side}:{connector.name}"]) for side in "ab")
+            found[connector.name] = grip(connector, a, b, t)
         return found
 
     def on_profile(self, q: Real, u: Real, t: float) -> tuple[Real, Real]:
@@ -187,10 +217,10 @@ class DenseSystem:
     def drives(self, t: float, q: Real, u: Real, rates: Real) -> dict[str, Real]:
         """Drive loads of prescribed coordinates by hinge, point mass or wheel, beyond springs, dampers and motors."""
         q, u = self.on_profile(q, u, t)
-        residual = self.mass_matrix(q) @ rates + self.bias(q, u, t) - self.applied(q, u, t)
+        needed = self.needed(t, q, u, rates)
         drives: dict[str, Real] = {}
         for x in self._prescribed:
-            drives[x.owner] = np.append(drives.get(x.owner, np.zeros(0)), residual[x.u])
+            drives[x.owner] = np.append(drives.get(x.owner, np.zeros(0)), needed[x.u])
         return drives
 
     def hinge_loads(self, t: float, q: Real, u: Real, rates: Real) -> dict[str, Real]:
@@ -319,10 +349,8 @@ class DenseSystem:
         frames = member_frames(self.tree, self._unit_motions(q)) if self.tree.linear else []
         return {k: body_jacobian(self.tree.members[k], frames[k], self.nu) for k in self.tree.linear}
 
-    def _site_jacobian(self, name: str, q: Real) -> Jacobian:
-        """Jacobian of the frame of one site."""
-        motion = self._unit_motions(q)
-        frames = member_frames(self.tree, motion)
+    def _site_columns(self, name: str, frames: list[MovingFrame], motion: Motions) -> Jacobian:
+        """Jacobian of the frame of one site, from the members' frames in unit motions."""
         return _columns(seat_frame(self.tree, frames, *self.tree.sites[name], motion))
 
     def _inertial(self, now: Instant, chosen: InertiaPoints) -> Wrenches:
@@ -335,15 +363,12 @@ class DenseSystem:
 
     def _loads(self, q: Real, t: float) -> dict[str, Wrenches]:
         """Loads at nodes by name, one point each."""
-        now = self._at(q)
-        loads = {}
+        now, loads = self._at(q), {}
         for load in self.scene.loads:
             site = now.seat(*self.tree.sites[f"load:{load.name}"])
-            direction = np.array(load.direction)
-            if load.frame == "node":
-                direction = site.rotation.value @ direction
-            value, none = profile(load.function, t).value * direction[None], np.zeros((1, 3))
-            torque, force = (value, none) if load.type == "torque" else (none, value)
+            size = profile(load.function, t).value * _direction(load, site.rotation.value)[None]
+            none = np.zeros((1, 3))
+            torque, force = (size, none) if load.type == "torque" else (none, size)
             loads[load.name] = Wrenches(torque, force, site.position.value[None])
         return loads
 
@@ -354,6 +379,12 @@ class DenseSystem:
             if member.parent in outboard:
                 outboard.append(i)
         return outboard
+
+
+def _direction(load: s.Load, rotation: Real) -> Real:
+    """Direction (3,) of a load in World at a node of this rotation (3,3)."""
+    direction = np.array(load.direction)
+    return np.asarray(rotation @ direction) if load.frame == "node" else direction
 
 
 def _turned(chosen: InertiaPoints, frames: MovingFrame) -> Real:

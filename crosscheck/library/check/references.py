@@ -33,7 +33,11 @@ def check_reference(run: RunFile, recipe: ReferenceRecipe, place: Place) -> Iter
         if engine not in (*variant.engines, *variant.also):
             text = f'engine "{engine}" does not run variant "{variant.name}"'
             yield problem(place.key("engines"), text, "add it to the variant's engines, or take it out here")
-    if len(recipe.routes) < 2:
+    if recipe.manufactured:
+        if recipe.routes:
+            text = "a manufactured motion is exact, and has no routes"
+            yield problem(place.key("route"), text, "take them out, or take out `manufactured`")
+    elif len(recipe.routes) < 2:
         text = f"a reference comes by two independent routes at least, and this one has {len(recipe.routes)}"
         yield problem(place.key("route"), text, "add a [[reference.route]] with another engine, or a closed form")
     if sum(not route.witness for route in recipe.routes) < 2 <= len(recipe.routes):
