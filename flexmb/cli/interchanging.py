@@ -60,12 +60,27 @@ def import_(
 
 def export(
     scene: SceneFile,
-    body: Annotated[str, typer.Argument(help="Name of a flexible body.", metavar="BODY", show_default=False)],
-    out: Out,
+    body: Annotated[
+        str | None, typer.Argument(help="Name of a flexible body, for --out.", metavar="[BODY]", show_default=False)
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="SID file of the body.", show_default=False)] = None,
     dialect: Annotated[
         Literal["wallrapp", "fembs"],
         typer.Option(help="wallrapp: J 3 x 3, columns of Gr and Ge by mode; fembs: J 6 x 1, columns by axis."),
     ] = "wallrapp",
+    fmu: Annotated[Path | None, typer.Option(help="Write the scene as an FMU (FMI 2.0).", show_default=False)] = None,
+    c: Annotated[
+        Path | None, typer.Option("--c", help="Folder for the scene as C, with one header.", show_default=False)
+    ] = None,
+    inputs: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--input", help="--fmu, --c: a load (NAME.function), motor or actuator as input.", show_default=False
+        ),
+    ] = None,
+    step: Annotated[
+        float | None, typer.Option(help="--fmu: Co-Simulation too, in equal steps (s).", show_default=False)
+    ] = None,
     no_user_code: NoUserCode = False,
 ) -> None:
     """
@@ -74,26 +89,67 @@ def export(
         flexmb export boom.toml strip --out strip.sid
         flexmb export boom.toml strip --out strip.SID_FEM --dialect fembs
 
-    **Exit code**: 0 written, 2 the scene or the body is wrong.
+    Or write the whole scene as a program that needs no Python: an FMU for other simulation tools, which takes a C
+    compiler, or C for one's own program. Both are for Linux on x86-64: see docs/export-fmu.md.
+
+        flexmb export arm.toml --fmu arm.fmu --input shoulder.rotation.torque_Nm --step 1e-4
+        flexmb export arm.toml --c arm
+
+    **Exit code**: 0 written, 2 the scene or the body is wrong, or is not exported: the message has the remedy.
     """
     with no_traceback():
-        from flexmb.interchange.sid import sid_of, with_sid_bodies, write_sid
-        from flexmb.scene.bodies import BeamBody, ModalBody
-        from flexmb.scene.check import check_and_warn
-        from flexmb.scene.files import load_scene
-        from flexmb.scene.problems import closest
+        if sum(target is not None for target in (out, fmu, c)) != 1:
+            raise ValueError("give one of --out FILE (with a BODY), --fmu FILE and --c FOLDER")
+        if (body is None) != (out is None):
+            raise ValueError("a BODY is written by --out FILE; --fmu and --c write the whole scene, without a BODY")
+        if (inputs and out is not None) or (step is not None and fmu is None):
+            raise ValueError("--input is for --fmu and --c, --step for --fmu")
+        if body is not None and out is not None:
+            _export_body(scene, body, out, dialect)
+        else:
+            _export_program(scene, fmu, c, inputs or [], step)
 
-        loaded = load_scene(scene)
-        check_and_warn(loaded)
-        check_folder(out.parent)
-        flexible = {
-            body.name: body for body in with_sid_bodies(loaded).bodies if isinstance(body, BeamBody | ModalBody)
-        }
-        if body not in flexible:
-            raise ValueError(f'"{body}" is not a flexible body of the scene: {closest(body, flexible)}')
-        folder(out.parent)
-        write_sid(sid_of(flexible[body]), out, dialect)
+
+def _export_body(scene: Path, body: str, out: Path, dialect: Literal["wallrapp", "fembs"]) -> None:
+    from flexmb.interchange.sid import sid_of, with_sid_bodies, write_sid
+    from flexmb.scene.bodies import BeamBody, ModalBody
+    from flexmb.scene.check import check_and_warn
+    from flexmb.scene.files import load_scene
+    from flexmb.scene.problems import closest
+
+    loaded = load_scene(scene)
+    check_and_warn(loaded)
+    check_folder(out.parent)
+    flexible = {body.name: body for body in with_sid_bodies(loaded).bodies if isinstance(body, BeamBody | ModalBody)}
+    if body not in flexible:
+        raise ValueError(f'"{body}" is not a flexible body of the scene: {closest(body, flexible)}')
+    folder(out.parent)
+    write_sid(sid_of(flexible[body]), out, dialect)
     console.print("wrote", str(out), soft_wrap=True)
+
+
+def _export_program(scene: Path, fmu: Path | None, c: Path | None, inputs: list[str], step: float | None) -> None:
+    from flexmb.export.writing import export_c, export_fmu
+    from flexmb.scene.files import load_scene
+
+    loaded = load_scene(scene)
+    with console.status(Text(f"compiling {scene}")):
+        if fmu is not None:
+            check_folder(fmu.parent)
+            folder(fmu.parent)
+            model = export_fmu(loaded, fmu, inputs=inputs, step=step)
+        else:
+            assert c is not None  # one of the three is given
+            check_folder(c)
+            model = export_c(loaded, c, inputs=inputs)
+    numbers = model.numbers.changeable
+    for what, names in (
+        ("inputs", [each.candidate.name for each in numbers if each.candidate.is_input]),
+        ("parameters", [each.candidate.name for each in numbers if not each.candidate.is_input]),
+    ):
+        console.print(printable(f"{what}: {', '.join(names) or 'none'}"), soft_wrap=True)
+    _tell(tuple(f"{name} is fixed: {why}" for name, why in model.numbers.fixed.items()))
+    console.print("wrote", str(fmu or c), soft_wrap=True)
 
 
 def reduce(

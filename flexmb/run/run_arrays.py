@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import Any, Literal, NamedTuple, TypeVar, assert_never
+from typing import Any, Literal, NamedTuple, Protocol, TypeVar, assert_never
 
 import numpy as np
 from numpy.typing import NDArray
@@ -192,7 +192,16 @@ def arrays_of(run: RunArrays) -> Iterator[tuple[Kind, str, Real]]:
             yield kind, name, values
 
 
-def labels(run: RunArrays, kind: Kind, name: str, width: int) -> list[tuple[str, str]]:
+class StateNames(Protocol):
+    """The names and units of coordinates and speeds."""
+
+    @property
+    def q_names(self) -> tuple[tuple[str, str], ...]: ...
+    @property
+    def u_names(self) -> tuple[tuple[str, str], ...]: ...
+
+
+def labels(run: StateNames, kind: Kind, name: str, width: int) -> list[tuple[str, str]]:
     """(name, unit) of each of the columns of one of the `arrays_of`, which has so many."""
     match kind:
         case "q":

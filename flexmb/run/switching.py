@@ -54,8 +54,8 @@ def timing(scene: Scene) -> Timing:
         if not isinstance(function, Function):
             continue
         match function:
-            case Pulse(start_s=start, duration_s=duration) | SmoothStep(start_s=start, duration_s=duration):
-                switches |= {start, start + duration}
+            case Pulse(start_s=begin, duration_s=duration) | SmoothStep(start_s=begin, duration_s=duration):
+                switches |= {begin, begin + duration}
             case SpinUp(duration_s=duration):
                 switches.add(duration)
             case Table(times_s=times):

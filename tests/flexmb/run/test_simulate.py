@@ -153,6 +153,7 @@ def test_steps_stop_where_a_load_switches():
     )
     assert timing(scene).between(0.0, 1.0) == [0.3, 0.5]
     assert timing(scene).between(0.0, 0.5) == [0.3]
+    assert (timing(scene).start, timing(scene).end) == (-math.inf, math.inf)  # it is defined before the load acts, too
     for options in ({}, {"method": "rk4", "step": 0.07}):
         run = fm.simulate(scene, 1.0, samples=[0.0, 0.4, 1.0], **options)
         assert run.u[:, 0] == pytest.approx([0.0, 0.2, 0.4], abs=20 * EPS)

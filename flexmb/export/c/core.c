@@ -1,0 +1,146 @@
+/* The functions of MODEL.h around the compiled equations; the tables of the scene stand before this text. */
+
+extern int32_t MODEL_kernel_rates(int64_t *, void **, double, int64_t, int64_t, int64_t, void *, void *);
+extern int32_t MODEL_kernel_outputs(int64_t *, void **, double, int64_t, int64_t, int64_t, void *, void *, void *);
+extern int32_t MODEL_kernel_settle(int64_t *, void **, double, int64_t, int64_t, void *);
+
+static unsigned char *memory_of(MODEL_instance *m) {
+    return (unsigned char *)(((uintptr_t)m->memory + 63) & ~(uintptr_t)63);
+}
+
+void MODEL_init(MODEL_instance *m) {
+    unsigned char *memory = memory_of(m);
+    memcpy(memory, IMAGE, sizeof IMAGE);
+    memset(memory + sizeof IMAGE, 0, MODEL_BYTES - sizeof IMAGE);
+    for (size_t i = 0; i < sizeof ADDRESSES / sizeof *ADDRESSES; i++) {
+        int64_t address = (int64_t)(uintptr_t)(memory + ADDRESSES[i][1]);
+        memcpy(memory + 8 * (size_t)ADDRESSES[i][0], &address, 8);
+    }
+    memcpy(m->number, MODEL_number_start, MODEL_NUMBERS * sizeof(double));
+    m->last = INFINITY;
+}
+
+void MODEL_settle(MODEL_instance *m, double t, double *y) {
+    int64_t result = 0;
+    void *error = NULL;
+    MODEL_kernel_settle(&result, &error, t, (int64_t)(uintptr_t)y, MODEL_STATES, memory_of(m) + CONSTANTS);
+}
+
+void MODEL_start(MODEL_instance *m, double t, double *y) {
+    memcpy(y, MODEL_state_start, MODEL_STATES * sizeof(double));
+    MODEL_settle(m, t, y);
+}
+
+void MODEL_set(MODEL_instance *m, int number, double value) {
+    double *words = (double *)memory_of(m);
+    if (m->number[number] == value) return;
+    m->number[number] = value;
+    for (int i = TOUCHES[number]; i < TOUCHES[number + 1]; i++) {
+        const int word = TOUCHED[i];
+        double sum = REST[word];
+        for (int k = EFFECTS[word]; k < EFFECTS[word + 1]; k++) sum += SLOPE[k] * m->number[OF_NUMBER[k]];
+        words[WORDS[word]] = sum;
+    }
+}
+
+static int defined(MODEL_instance *m, double *t) {
+    if (*t > m->last) *t = m->last;
+    return *t >= FROM && *t <= UNTIL;
+}
+
+int MODEL_rhs(MODEL_instance *m, double t, const double *y, double *dy) {
+    unsigned char *memory = memory_of(m);
+    int64_t result = 0;
+    void *error = NULL;
+    if (!defined(m, &t)) return MODEL_OUT_OF_TIME;
+    if (MODEL_kernel_rates(&result, &error, t, (int64_t)(uintptr_t)y, (int64_t)(uintptr_t)dy, MODEL_STATES,
+                           memory + CONSTANTS, memory + WORKSPACE))
+        return -1;
+    return (int)result;
+}
+
+int MODEL_outputs(MODEL_instance *m, double t, const double *y, double *dy, double *out) {
+    unsigned char *memory = memory_of(m);
+    const double *words = (const double *)memory;
+    int64_t result = 0;
+    void *error = NULL;
+    if (!defined(m, &t)) return MODEL_OUT_OF_TIME;
+    if (MODEL_kernel_outputs(&result, &error, t, (int64_t)(uintptr_t)y, (int64_t)(uintptr_t)dy, MODEL_STATES,
+                             memory + CONSTANTS, memory + WORKSPACE, memory + OUTPUTS))
+        return -1;
+    if (result) return (int)result;
+    for (int i = 0; i < MODEL_OUTPUTS; i++) {
+        const double *energy = words + ENERGY;
+        out[i] = PLACE[i] >= 0 ? words[PLACE[i]] : energy[0] + energy[1] + energy[2] + energy[3];
+    }
+    return 0;
+}
+
+double MODEL_next_switch(double t) {
+    for (int i = 0; i < SWITCHES; i++)
+        if (SWITCH[i] > t) return SWITCH[i];
+    return INFINITY;
+}
+
+void MODEL_segment(MODEL_instance *m, double t) {
+    const double next = MODEL_next_switch(t);
+    m->last = isinf(next) ? next : nextafter(next, t);
+}
+
+static int all_finite(const double *y) {
+    for (int i = 0; i < MODEL_STATES; i++)
+        if (!isfinite(y[i])) return 0;
+    return 1;
+}
+
+/* One step from y to stage[5]. The formulas are those of flexmb's method "rk4". */
+static int step_of(MODEL_instance *m, double t, const double *y, double h) {
+    double (*k)[MODEL_STATES] = m->stage, *trial = m->stage[4];
+    static const double share[4] = {0.0, 0.5, 0.5, 1.0};
+    for (int s = 0; s < 4; s++) {
+        const double part = share[s] * h;
+        for (int i = 0; i < MODEL_STATES; i++) trial[i] = s ? y[i] + part * k[s - 1][i] : y[i];
+        int status = MODEL_rhs(m, t + part, trial, k[s]);
+        if (status) return status;
+    }
+    for (int i = 0; i < MODEL_STATES; i++)
+        m->stage[5][i] = y[i] + h / 6.0 * (k[0][i] + 2.0 * (k[1][i] + k[2][i]) + k[3][i]);
+    return all_finite(m->stage[5]) ? 0 : 2;
+}
+
+int MODEL_run(MODEL_instance *m, double t, double t_end, double step, double *y, double *reached) {
+    *reached = t;
+    while (t < t_end) {
+        const double next = MODEL_next_switch(t), end = t_end < next ? t_end : next, start = t;
+        const double needed = ceil((end - t) / step * (1.0 - 1e-9)), steps = needed < 1.0 ? 1.0 : needed;
+        const double h = (end - start) / steps;
+        MODEL_segment(m, start);
+        for (double j = 0.0; j < steps; j += 1.0) {
+            int status = step_of(m, t, y, h);
+            if (status) return status;
+            t = j == steps - 1.0 ? end : start + (j + 1.0) * h;
+            MODEL_settle(m, t, m->stage[5]);
+            memcpy(y, m->stage[5], MODEL_STATES * sizeof(double));
+            *reached = t;
+        }
+    }
+    MODEL_segment(m, t);
+    return 0;
+}
+
+void MODEL_message(MODEL_instance *m, int status, char *text, size_t size) {
+    int64_t fault = 0;
+    memcpy(&fault, memory_of(m) + 8 * (size_t)FAULT, 8);
+    if (status == MODEL_OUT_OF_TIME) {
+        snprintf(text, size, "a table of the scene is defined from %.17g to %.17g s only: stay within", FROM, UNTIL);
+        return;
+    }
+    for (size_t i = 0; i < sizeof ADVICE / sizeof *ADVICE; i++)
+        if (ADVICE[i].status == status) {
+            const char *const *names = status == OVERTURNED ? CONNECTOR_NAMES : BODY_NAMES;
+            const int count = status == OVERTURNED ? CONNECTORS : BODIES;
+            snprintf(text, size, ADVICE[i].text, fault >= 0 && fault < count ? names[fault] : "?");
+            return;
+        }
+    snprintf(text, size, status ? "the evaluation failed with status %d" : "done", status);
+}

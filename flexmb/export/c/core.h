@@ -1,0 +1,66 @@
+/* A model that flexmb exported: its equations of motion, without Python and without allocation.
+ *
+ * A state is a row of MODEL_STATES numbers [coordinates, speeds, work], named in MODEL_state_names, in SI units. Inputs
+ * and parameters are MODEL_NUMBERS numbers, inputs first, named in MODEL_number_names; outputs are named in
+ * MODEL_output_names. Functions return 0, or a status that MODEL_message explains.
+ *
+ * An instance must not be moved or copied as memory, because it holds addresses of its own parts. Any number of
+ * instances may be used at once, each by one thread at a time. Link with -lm.
+ */
+#ifndef MODEL_H
+#define MODEL_H
+
+#include <stddef.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define MODEL_STATES @STATES@
+#define MODEL_COORDINATES @COORDINATES@
+#define MODEL_INPUTS @INPUTS@
+#define MODEL_NUMBERS @NUMBERS@
+#define MODEL_OUTPUTS @OUTPUTS@
+#define MODEL_BYTES @BYTES@
+
+#define MODEL_OUT_OF_TIME (-2) /* a table of the scene does not reach there */
+
+typedef struct {
+    double number[MODEL_NUMBERS + 1]; /* inputs and parameters; change them by MODEL_set */
+    double last; /* s: functions of time are those of the segment that ends here, see MODEL_segment */
+    double stage[6][MODEL_STATES]; /* scratch of MODEL_run */
+    unsigned char memory[MODEL_BYTES + 64];
+} MODEL_instance;
+
+extern const char *const MODEL_state_names[];
+extern const char *const MODEL_number_names[];
+extern const char *const MODEL_output_names[];
+extern const double MODEL_state_start[];
+extern const double MODEL_number_start[];
+
+/* Give an instance the numbers of the scene. */
+void MODEL_init(MODEL_instance *m);
+/* The scene's start at time t: its values, with prescribed motions as they are then. */
+void MODEL_start(MODEL_instance *m, double t, double *y);
+/* Change an input or a parameter. */
+void MODEL_set(MODEL_instance *m, int number, double value);
+/* dy/dt at time t (s). */
+int MODEL_rhs(MODEL_instance *m, double t, const double *y, double *dy);
+/* The same, and all outputs. */
+int MODEL_outputs(MODEL_instance *m, double t, const double *y, double *dy, double *out);
+/* Quaternions get unit length, prescribed motions their values. */
+void MODEL_settle(MODEL_instance *m, double t, double *y);
+/* The first time after t at which a function of time jumps or is not smooth; infinity if there is none. */
+double MODEL_next_switch(double t);
+/* Functions of time have their limits from the left at the next switch after t, until this is called again. */
+void MODEL_segment(MODEL_instance *m, double t);
+/* From t to t_end by the classical Runge-Kutta method, in equal steps of at most `step`, none of which crosses a
+ * switch; y is moved on as far as *reached. */
+int MODEL_run(MODEL_instance *m, double t, double t_end, double step, double *y, double *reached);
+/* What a status means; a text that `text` (size) receives. */
+void MODEL_message(MODEL_instance *m, int status, char *text, size_t size);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,206 @@
+"""A scene as an exported model: equations as machine code, tables as a block, variables by name and unit."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from hashlib import sha256
+from typing import Any, NamedTuple
+
+from flexmb.export import entry
+from flexmb.export.emitted import emitted
+from flexmb.export.image import ROW, Image, image
+from flexmb.export.numbers import Numbers, numbers, with_inputs
+from flexmb.export.refusals import refuse
+from flexmb.jit.pointer import REAL, WHOLE
+from flexmb.run.run_arrays import Kind, labels
+from flexmb.run.switching import Timing, timing_of
+from flexmb.scene.connectors import AlongHinge
+from flexmb.scene.files import dumps
+from flexmb.scene.schema import Scene
+from flexmb.system.compile import assembled, compile
+from flexmb.system.observables import ENERGIES
+from flexmb.system.system import System
+from flexmb.tables.status import Status
+from flexmb.tables.workspaces import workspace
+from flexmb.typing import Real
+
+C, W, OUT = range(3)
+"""Numbers of the bundles in the block: constants, workspace, outputs."""
+TOTAL = -1
+"""Place of the output that is no word of the block: the sum of the energies."""
+
+
+class Variable(NamedTuple):
+    """A variable of the model: its name, unit and start value."""
+
+    name: str
+    unit: str
+    start: float = 0.0
+
+
+class Output(NamedTuple):
+    """An output and its word in the block, or TOTAL."""
+
+    name: str
+    unit: str
+    word: int
+
+
+class ExportedModel(NamedTuple):
+    """What is exported.
+
+    name: of the scene; identifier: as a name of C; digest: of the scene's text. states: q, u and work, the speeds after
+    `coordinates` of them. numbers: inputs and parameters. bodies, connectors: names for messages. fault: word with the
+    number of the body that a failure is at. code: object file with functions <identifier>_kernel_rates, _outputs and
+    _settle.
+    """
+
+    name: str
+    description: str
+    identifier: str
+    digest: str
+    states: tuple[Variable, ...]
+    coordinates: int
+    numbers: Numbers
+    outputs: tuple[Output, ...]
+    image: Image
+    timing: Timing
+    bodies: tuple[str, ...]
+    connectors: tuple[str, ...]
+    fault: int
+    code: bytes
+
+    def outputs_at(self, name: str) -> int:
+        """The word of an output."""
+        return next(output.word for output in self.outputs if output.name == name)
+
+
+def model(scene: Scene, inputs: Sequence[str] = ()) -> ExportedModel:
+    """The model of a scene; inputs: paths of loads, motors and actuators that are inputs instead of what they are.
+
+    Constant loads, motors and actuators are inputs, too. NotExportable for what is not exported, before anything is
+    compiled; SceneError for a scene that is wrong, PathError for an input that is not there.
+    """
+    prepared, kinds = tabled(scene, inputs)
+    return prepared._replace(code=_code(prepared.identifier, kinds))
+
+
+def tabled(scene: Scene, inputs: Sequence[str] = ()) -> tuple[ExportedModel, tuple[Any, Any, Any]]:
+    """The model without its code, and the types of the tables that the code is compiled for."""
+    refuse(scene)
+    scene = with_inputs(scene, tuple(inputs))
+    system = compile(scene, kernels="special")
+    apart = system.with_numbers(system.scene)  # equal functions of time are numbers of their own
+    tables = _tables(apart)
+    kinds = tuple(each._numba_type_ for each in tables)
+    base = image(tables)
+    start = assembled(system.scene).initial_state  # by kernels that are at hand
+
+    def block(changed: Scene) -> Image | None:
+        other = _tables(system.with_numbers(changed))
+        same = all(each._numba_type_ == kind for each, kind in zip(other, kinds, strict=True))
+        if not same or any(_shapes(a) != _shapes(b) for a, b in zip(other, tables, strict=True)):
+            return None
+        return _without_doubt(image(other, base), system)
+
+    found = numbers(system.scene, _without_doubt(base, system), block)
+    identifier = _identifier(scene.name)
+    q, u = system.state_names
+    names = (*q, *u, ("work", "J"))
+    states = tuple(Variable(*each, float(value)) for each, value in zip(names, start.y, strict=True))
+    links = tuple(link.name for link in system.links)
+    return ExportedModel(
+        scene.name, scene.description, identifier, sha256(dumps(scene).encode()).hexdigest(), states, system.nq,
+        found, tuple(_outputs(system, base)), base, timing_of(system), links,
+        tuple(system.observed_names.connectors), base.word(W, "fault"), b"",
+    ), kinds  # fmt: skip
+
+
+def memory(system: System) -> Image:
+    """The block of memory that an instance of the system has."""
+    return image(_tables(system))
+
+
+def _tables(system: System) -> tuple[Any, Any, Any]:
+    c = system.explicit_constants
+    return c, workspace(c, system.nq, system.nu), system.observation.outputs()
+
+
+def _shapes(bundle: Any) -> list[tuple[int, ...]]:
+    return [getattr(bundle, name).shape for name in bundle.__dataclass_fields__]
+
+
+def _without_doubt(block: Image, system: System) -> Image:
+    """The block without the size below which a pivot is doubtful: an exported model does not ask for it."""
+    words, speed = block.words.copy(), system.explicit_constants.speed
+    if len(speed):
+        first, place = block.word(C, "speed"), speed["doubtful"].ctypes.data - speed.ctypes.data
+        words[first + place // ROW :: speed.itemsize // ROW][: len(speed)] = 0.0
+    return Image(words, block.stored, block.addresses, block.bundles, block.arrays)
+
+
+def _code(identifier: str, kinds: tuple[Any, Any, Any]) -> bytes:
+    (c, w, out), state = kinds, (REAL, WHOLE, WHOLE, WHOLE)
+    return emitted({
+        f"{identifier}_kernel_rates": (entry.rates, (*state, c, w)),
+        f"{identifier}_kernel_outputs": (entry.outputs, (*state, c, w, out)),
+        f"{identifier}_kernel_settle": (entry.settle, (REAL, WHOLE, WHOLE, c)),
+    })  # fmt: skip
+
+
+class _Named(NamedTuple):
+    """What `labels` needs of a run."""
+
+    q_names: tuple[tuple[str, str], ...]
+    u_names: tuple[tuple[str, str], ...]
+
+
+def _outputs(system: System, block: Image) -> Iterator[Output]:
+    """Everything observable, in the order of a trajectory's columns; rotations are matrices."""
+    names, out = system.observed_names, system.observation.out
+    run = _Named(*system.state_names)
+
+    def place(array: Real) -> int:
+        return block.word(OUT, "every") + (array.ctypes.data - out.every.ctypes.data) // ROW
+
+    def columns(kind: Kind, name: str, first: int, width: int) -> Iterator[Output]:
+        for i, (label, unit) in enumerate(labels(run, kind, name, width)):
+            yield Output(label, unit, first + i)
+
+    for i, name in enumerate(names.markers):
+        first = place(out.markers[i])
+        yield from columns("position", name, first, 3)
+        for k in range(9):
+            yield Output(f"{name}.rotation[{k // 3 + 1},{k % 3 + 1}]", "1", first + 3 + k)
+        yield from columns("velocity", name, first + 12, 6)
+        yield from columns("acceleration", name, first + 18, 6)
+    spatial: tuple[tuple[Kind, Sequence[str], Real], ...] = (
+        ("loads", names.hinges, out.loads), ("wheel_loads", names.wheels, out.wheel_loads),
+        ("connectors", names.connectors, out.connectors),
+    )  # fmt: skip
+    for kind, whose, rows in spatial:
+        for i, name in enumerate(whose):
+            yield from columns(kind, name, place(rows[i]), 6)
+    for name, places in names.driven.items():
+        for i, speed in enumerate(places.tolist()):
+            unit = {"rad/s": "N m", "m/s": "N"}[run.u_names[speed][1]]
+            yield Output(f"{name}.drive[{i}]", unit, block.word(OUT, "drives") + speed)
+    along = {each.name: each for each in system.scene.connectors if isinstance(each, AlongHinge)}
+    for i, name in enumerate(names.hinge_forces):
+        unit = "N m" if along[name].ANGULAR else "N"
+        yield Output(f"{name}.hinge_force", unit, place(out.hinge_forces[i:]))
+    for i, name in enumerate(ENERGIES):
+        yield Output(f"energy.{name}", "J", place(out.energy[i:]))
+    yield Output("energy.total", "J", TOTAL)
+    yield from columns("momentum", "momentum", place(out.momentum), 6)
+
+
+def _identifier(name: str) -> str:
+    """The name of a scene as one of C."""
+    word = re.sub(r"\W", "_", name, flags=re.ASCII).strip("_") or "scene"
+    return word if word[0].isalpha() else f"model_{word}"
+
+
+ADVICE = {int(status): status.advice for status in Status if status is not Status.OK}
+"""What the kernels' status codes mean, by their numbers."""

@@ -1,0 +1,122 @@
+"""A library of FMI 2.0 as a tool uses it, by ctypes: what the tests need where fmpy is not installed."""
+
+from __future__ import annotations
+
+import ctypes as ct
+import xml.etree.ElementTree as ET
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+LOGGER = ct.CFUNCTYPE(None, ct.c_void_p, ct.c_char_p, ct.c_int, ct.c_char_p, ct.c_char_p, ct.c_char_p)
+ALLOCATE = ct.CFUNCTYPE(ct.c_void_p, ct.c_size_t, ct.c_size_t)
+FREE = ct.CFUNCTYPE(None, ct.c_void_p)
+EXCHANGE, SIMULATION = 0, 1
+
+
+class Callbacks(ct.Structure):
+    """fmi2CallbackFunctions."""
+
+    _fields_ = (
+        ("logger", LOGGER), ("allocate", ALLOCATE), ("free", FREE), ("finished", ct.c_void_p), ("place", ct.c_void_p),
+    )  # fmt: skip
+
+
+class EventInfo(ct.Structure):
+    """fmi2EventInfo."""
+
+    _fields_ = (
+        *((name, ct.c_int) for name in ("again", "ends", "nominals", "states", "has_next")),
+        ("next", ct.c_double),
+    )
+
+
+class Fmu:
+    """An archive, unpacked: its library, and its variables by name."""
+
+    def __init__(self, path: Path, folder: Path) -> None:
+        with zipfile.ZipFile(path) as archive:
+            archive.extractall(folder)
+            self.contents = {name: archive.read(name) for name in archive.namelist()}
+        self.root = ET.fromstring(self.contents["modelDescription.xml"])
+        variables = self.root.findall("ModelVariables/ScalarVariable")
+        self.numbers = {each.get("name"): int(each.get("valueReference", "")) for each in variables}
+        self.causality = {each.get("name"): each.get("causality") for each in variables}
+        self.unit = {each.get("name"): each[0].get("unit") for each in variables}
+        [library] = (folder / "binaries" / "linux64").iterdir()
+        self.library = ct.CDLL(str(library))
+        self.library.fmi2Instantiate.restype = ct.c_void_p
+
+    def instance(self, kind: int = EXCHANGE, guid: str | None = None) -> Instance:
+        """A new instance."""
+        return Instance(self, kind, self.root.get("guid", "") if guid is None else guid)
+
+
+class Instance:
+    """An instance, with the messages that it has logged."""
+
+    def __init__(self, fmu: Fmu, kind: int, guid: str) -> None:
+        self.fmu, self.messages = fmu, list[str]()
+        libc = ct.CDLL(None)
+        libc.calloc.restype, libc.calloc.argtypes, libc.free.argtypes = ct.c_void_p, (ct.c_size_t,) * 2, (ct.c_void_p,)
+
+        def log(_place: Any, _name: Any, _status: Any, _kind: Any, _form: Any, text: bytes) -> None:
+            self.messages.append(text.decode())
+
+        self._callbacks = Callbacks(LOGGER(log), ALLOCATE(libc.calloc), FREE(libc.free), None, None)
+        call = fmu.library.fmi2Instantiate
+        self.address = call(b"one", kind, guid.encode(), b"", ct.byref(self._callbacks), 0, 0)
+
+    def call(self, name: str, *arguments: Any) -> int:
+        """The status of a function."""
+        return int(getattr(self.fmu.library, name)(ct.c_void_p(self.address), *arguments))
+
+    def do(self, name: str, *arguments: Any) -> None:
+        """Call a function; AssertionError with its message unless it succeeds."""
+        assert self.call(name, *arguments) == 0, (name, self.messages)
+
+    def start(self, t: float = 0.0, **values: float) -> Instance:
+        """Initialise at a time, with start values by name."""
+        self.do("fmi2SetupExperiment", 0, ct.c_double(0.0), ct.c_double(t), 0, ct.c_double(0.0))
+        self.do("fmi2EnterInitializationMode")
+        self.set(values)
+        self.do("fmi2ExitInitializationMode")
+        return self
+
+    def events(self) -> EventInfo:
+        """New discrete states, then continuous time."""
+        info = EventInfo()
+        self.do("fmi2NewDiscreteStates", ct.byref(info))
+        self.do("fmi2EnterContinuousTimeMode")
+        return info
+
+    def set(self, values: dict[str, float]) -> None:
+        """Set variables by name."""
+        numbers = (ct.c_uint * len(values))(*(self.fmu.numbers[name] for name in values))
+        self.do("fmi2SetReal", numbers, ct.c_size_t(len(values)), (ct.c_double * len(values))(*values.values()))
+
+    def get(self, *names: str) -> Any:
+        """Values of variables by name, (n,)."""
+        numbers, values = (ct.c_uint * len(names))(*(self.fmu.numbers[name] for name in names)), np.empty(len(names))
+        self.do("fmi2GetReal", numbers, ct.c_size_t(len(names)), _pointer(values))
+        return values
+
+    def rates(self, t: float, y: Any) -> Any:
+        """dy/dt (n,) of the state y (n,) at time t."""
+        y, dy = np.ascontiguousarray(y, float), np.empty(len(y))
+        self.do("fmi2SetTime", ct.c_double(t))
+        self.do("fmi2SetContinuousStates", _pointer(y), ct.c_size_t(len(y)))
+        self.do("fmi2GetDerivatives", _pointer(dy), ct.c_size_t(len(y)))
+        return dy
+
+    def states(self, count: int) -> Any:
+        """The present state (count,)."""
+        y = np.empty(count)
+        self.do("fmi2GetReal", (ct.c_uint * count)(*range(count)), ct.c_size_t(count), _pointer(y))
+        return y
+
+
+def _pointer(values: Any) -> Any:
+    return values.ctypes.data_as(ct.POINTER(ct.c_double))
