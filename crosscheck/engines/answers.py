@@ -131,7 +131,9 @@ def checked_run(answer: Any, times: Real, scene: Scene) -> Trajectory:
         },
         **{name: _output(getattr(answer, name), name, count, known.get(name)) for name in OUTPUTS},
         wall_s=_number(answer.wall_s, "wall_s"),
-        evaluations=_count(answer.evaluations),
+        evaluations=_count(answer.evaluations, "evaluations"),
+        steps=_count(answer.steps, "steps"),
+        operations=_count(answer.operations, "operations"),
         undetermined=_undetermined(answer, scene),
         events=_events(answer.events),
     )
@@ -346,11 +348,9 @@ def _number(answer: Any, where: str) -> float:
     return value
 
 
-def _count(answer: Any) -> int:
+def _count(answer: Any, where: str) -> int:
     whole = isinstance(answer, numbers.Integral) and not isinstance(answer, bool)
-    _require(
-        whole and 0 <= answer <= LARGEST_COUNT, f"evaluations is {answer!r:.40}: a whole number from 0 is expected"
-    )
+    _require(whole and 0 <= answer <= LARGEST_COUNT, f"{where} is {answer!r:.40}: a whole number from 0 is expected")
     return int(answer)
 
 

@@ -140,7 +140,9 @@ class Trajectory:
     they are not compared. An engine that names a component that the motion determines has failed; on a scene without
     closures and couplings that is all of them. `events`: name and time (s) of what happened, in the order of time.
     `envelope`, only where the run asks for it: by channel the extremes over all of its steps and both sides of events,
-    as rows of `crosscheck.engines.extremes`.
+    as rows of `crosscheck.engines.extremes`. `evaluations` of the right-hand side (of the residual, for implicit
+    solvers), `steps` made, refused ones too, and floating-point `operations` are 0 where the engine does not count
+    them, and the report says so.
     """
 
     status: Status
@@ -160,6 +162,8 @@ class Trajectory:
     known_to: dict[str, Real] = _by_name()
     wall_s: float = 0.0
     evaluations: int = 0
+    steps: int = 0
+    operations: int = 0
     undetermined: tuple[str, ...] = ()
     events: tuple[tuple[str, float], ...] = ()
     envelope: dict[str, Real] = field(default_factory=dict)

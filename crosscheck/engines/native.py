@@ -38,9 +38,11 @@ from crosscheck.engines.steps import USUAL_S, ladder
 from crosscheck.engines.trajectories import first_samples
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.integrate.integrator import Method
+from flexmb.kept import kept
 from flexmb.modal.flexible import flexible_model
 from flexmb.run.channels import channels_of, is_vector
 from flexmb.run.envelope import Envelope, Extremes
+from flexmb.run.operations import of_evaluation, of_run
 from flexmb.run.simulate import RunSettings, refuse_without_jacobian, simulate
 from flexmb.run.trajectory import Trajectory as NativeTrajectory
 from flexmb.scene.events import EndRun
@@ -161,6 +163,11 @@ class NativeModel:
         """The scene with its SID bodies read."""
         return self._system.scene
 
+    @kept
+    def _each(self) -> int:
+        """Floating-point operations of an evaluation; the first run, which is `warm_up`, counts them."""
+        return of_evaluation(self._system, self._algorithm)
+
     def warm_up(self) -> None:
         """Compile or load what a run needs: the integrator, by a run over next to no time, and the outputs."""
         effort = Effort("step" if INTEGRATORS[self._method].fixed else "tolerance", 1e-3, self._method)
@@ -209,6 +216,8 @@ class NativeModel:
             **{name: getattr(done, name) for name in OUTPUTS if name not in LINEAR},
             wall_s=done.statistics.run_s,
             evaluations=done.statistics.evaluations,
+            steps=done.statistics.accepted_steps + done.statistics.rejected_steps,
+            operations=int(of_run(effort.method, self._each, self._system.nq + self._system.nu + 1, done.statistics)),
             undetermined=Openness.of_flags(_undetermined(done)).names,
             events=tuple((event.name, event.t) for event in done.events),
         )

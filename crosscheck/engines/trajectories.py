@@ -23,6 +23,7 @@ def stack(
     message: str,
     wall_s: float,
     evaluations: int,
+    steps: int = 0,
     work: Real | None = None,
     linear: LinearOutputs = NOTHING,
 ) -> Trajectory:
@@ -48,6 +49,7 @@ def stack(
         work=work,
         wall_s=wall_s,
         evaluations=evaluations,
+        steps=steps,
     )
 
 

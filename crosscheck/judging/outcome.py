@@ -13,7 +13,9 @@ from crosscheck.judging.figures import recordable
 from crosscheck.judging.results import CaseResults, Session
 from crosscheck.judging.unjudged import Unjudged, unjudged
 from crosscheck.judging.verdict import Verdict
+from crosscheck.judging.work import MAIN, RunKey, WorkChange, keys_of, work_by_run, work_changes
 from crosscheck.library.claims import ClaimedFailure, ClaimedGoals
+from crosscheck.library.work import Work
 from crosscheck.records.kinds import ENVELOPE, ContractState
 from flexmb.kept import kept
 from flexmb.run.channels import matches
@@ -58,7 +60,8 @@ class SessionOutcome:
     `unreferenced`: the cases with a recipe of a reference but no reference. `made_with`: versions and processor of the
     last session in the records. `unfinished`: the session has not ended, so nothing is judged. `idle_claims`: the
     user's claims that name nothing, in words. `lost_controls`: controls that were compared in no channel. `contracts`:
-    of outside engines, whether they keep the contract.
+    of outside engines, whether they keep the contract. `work_changes`: counts that are not those of the reference's
+    runs; `work`: what every finest run took, by case, variant, engine and role.
     """
 
     verdicts: dict[str, list[Verdict]]
@@ -74,6 +77,8 @@ class SessionOutcome:
     unjudged: tuple[Unjudged, ...] = ()
     lost_controls: tuple[LostControl, ...] = ()
     contracts: Mapping[str, ContractState] = field(default_factory=dict)
+    work_changes: tuple[WorkChange, ...] = ()
+    work: Mapping[RunKey, Work] = field(default_factory=dict)
 
     @property
     def all(self) -> list[Verdict]:
@@ -162,6 +167,21 @@ class SessionOutcome:
             verdict for verdict in self.all if verdict.ok and verdict.accepted is None and recordable(verdict, BUILT_IN)
         ]
 
+    def work_of(self, verdict: Verdict) -> tuple[Work | None, Work | None]:
+        """What the finest runs of a verdict's sides took; None where there was no run, as of a reference."""
+        a, b = map(self.work.get, keys_of(verdict))
+        return a, None if verdict.kind == "conservation" else b
+
+    @property
+    def main_work(self) -> dict[tuple[str, str, str], Work]:
+        """What the finest runs took that are no controls and no refinements, by case, variant and engine."""
+        return {key[:3]: work for key, work in self.work.items() if key[3] == MAIN}
+
+    @property
+    def dearer(self) -> list[WorkChange]:
+        """Runs that take more work than those that made the reference."""
+        return [change for change in self.work_changes if change.dearer]
+
     @kept
     def lost(self) -> list[Absence]:
         """Runs that were asked for and did not run, or that failed without a verdict that shows it, as envelopes do.
@@ -183,7 +203,7 @@ class SessionOutcome:
         complete = not self.unfinished and bool(self.all) and not self.lost and not self.broken
         idle = self.uncompared or self.idle_claims or self.lost_controls
         sound = complete and not self.unexpected and not idle
-        lacking = self.worse or self.outgrown or self.unrecorded or self.unreferenced or self.unaccounted
+        lacking = self.worse or self.outgrown or self.unrecorded or self.unreferenced or self.unaccounted or self.dearer
         return sound and not (self.strict and lacking)
 
     @property
@@ -215,6 +235,9 @@ class SessionOutcome:
         if self.strict and self.unaccounted:
             count = len(self.unaccounted)
             parts.append(f"{count} channel{'s are' if count > 1 else ' is'} offered and judged by nothing")
+        if self.strict and self.dearer:
+            count = len(self.dearer)
+            parts.append(f"{count} count{'s of runs are' if count > 1 else ' of a run is'} more work than recorded")
         if self.uncompared:
             parts.append(self._uncompared)
         if self.broken:
@@ -287,6 +310,8 @@ def conclude(session: Session, strict: bool = False) -> SessionOutcome:
         contracts={
             name: state for environment in session.environments for name, state in environment.contracts.items()
         },
+        work_changes=tuple(change for case in session.cases for change in work_changes(case)),
+        work=dict(item for case in session.cases for item in work_by_run(case)),
     )
 
 

@@ -23,6 +23,7 @@ import numpy as np
 from crosscheck.library.case import CaseError, Variant
 from crosscheck.library.find import Case
 from crosscheck.library.read_file import struct_of, text_of
+from crosscheck.library.work import StoredWork
 from flexmb.run.channels import unit
 from flexmb.scene.problems import SceneError
 from flexmb.scene.reading import MIB, Unreadable, parse_toml
@@ -47,7 +48,8 @@ class Known(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
 class Knowledge(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """reference.toml. `values`, `provenance` and `scene` are digests of reference.csv, of provenance.toml and of
-    the variant (see `scene_digest`); `routes` describe how the numbers were made, `made_with` by which versions."""
+    the variant (see `scene_digest`); `routes` describe how the numbers were made, `made_with` by which versions, and
+    `work` what each effort of an engine took (`crosscheck.library.work`); older files do not say."""
 
     variant: str
     horizon_s: float
@@ -56,6 +58,7 @@ class Knowledge(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     scene: str
     routes: tuple[str, ...]
     made_with: tuple[str, ...]
+    work: StoredWork = {}
     channels: dict[str, Known]
 
 

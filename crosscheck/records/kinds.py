@@ -13,6 +13,7 @@ import msgspec
 from crosscheck.library.accepted import Accepted
 from crosscheck.library.case import Provenance, RunFile
 from crosscheck.library.claims import Claims
+from crosscheck.library.work import StoredWork
 from crosscheck.records.drawing import Drawing
 from crosscheck.records.packing import Packed
 
@@ -26,8 +27,8 @@ class ReferenceGoals(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
 
 class RecordedReference(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The reference of `variant`: channels (T, k) at `times` (T,), their `uncertainties` (SI), and the engines that are
-    compared with it (`asked`). `routes` say how its numbers were made; older records have none. If the stored files
-    cannot be used, `fault` says why, and there are no arrays.
+    compared with it (`asked`). `routes` say how its numbers were made, and `work` what they took; older records have
+    none. If the stored files cannot be used, `fault` says why, and there are no arrays.
     """
 
     variant: str
@@ -36,6 +37,8 @@ class RecordedReference(msgspec.Struct, frozen=True, kw_only=True, forbid_unknow
     channels: dict[str, Packed] = {}
     uncertainties: dict[str, float] = {}
     routes: tuple[str, ...] = ()
+    work: StoredWork = {}
+    made_with: tuple[str, ...] = ()
     fault: str = ""
 
 
@@ -145,7 +148,9 @@ class RunRecord(_OneRecord, frozen=True, kw_only=True, tag="run"):
 
     `role` is "main", "refined", "control:<name>", "film" or "envelope". `rung` is the number of the effort, from coarse
     to fine, of `rungs`. `scene` identifies scene and sample times, `made_by` everything else that the result depends on
-    (see `made_by.py`; "" in older records). `compile_s` is conversion and warm-up, `wall_s` the solve alone.
+    (see `made_by.py`; "" in older records). `compile_s` is conversion and warm-up, `wall_s` the solve alone, `cpu_s`
+    the processor time of the whole call, outputs included, on all threads. `evaluations`, `steps` and `operations` are
+    0 where the engine does not count them, and in older records.
 
     `status`: "finished"; "diverged", by the engine's statement; "failed" if the adapter raised or broke the contract;
     "crashed" if its process died; "did not finish" within its limits of time and memory; "refused"; "did not run".
@@ -173,7 +178,10 @@ class RunRecord(_OneRecord, frozen=True, kw_only=True, tag="run"):
     rungs: int = 0
     compile_s: float = 0.0
     wall_s: float = 0.0
+    cpu_s: float = 0.0
     evaluations: int = 0
+    steps: int = 0
+    operations: int = 0
     times: Packed | None = None
     channels: dict[str, Packed] = {}
     undetermined: tuple[str, ...] = ()

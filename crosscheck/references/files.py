@@ -11,6 +11,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import tomlkit
+from tomlkit.items import Table
 
 from crosscheck.library.reference import KNOWLEDGE, VALUES, Knowledge, StoredReference
 from crosscheck.references.agreement import Agreed
@@ -29,9 +30,21 @@ def knowledge_text(knowledge: Knowledge) -> str:
             rows = tomlkit.array()
             rows.extend(value)
             document[key] = rows.multiline(True)
+        elif key == "work":
+            document.update(_work_table(value))
         else:
             document[key] = value
     return tomlkit.dumps(document)
+
+
+def _work_table(work: dict[str, dict[str, int]]) -> dict[str, Table]:
+    """The table [work], a line for each run; none if nothing was counted."""
+    table = tomlkit.table()
+    for run, counts in work.items():
+        line = tomlkit.inline_table()
+        line.update(counts)
+        table[run] = line
+    return {"work": table} if work else {}
 
 
 def write_both(folder: Path, values: str, knowledge: str) -> None:

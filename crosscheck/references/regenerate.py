@@ -22,6 +22,7 @@ from crosscheck.library.reference import (
     scene_digest,
     values_text,
 )
+from crosscheck.library.work import changes
 from crosscheck.references.agreement import Agreed, agree
 from crosscheck.references.anchors import meet
 from crosscheck.references.files import beyond_uncertainty, knowledge_text, largest_share, write_both
@@ -83,10 +84,12 @@ def regenerate(
     knowledge = _knowledge(case, recipe, routes, agreed, values)
     remark = "" if before is None else _permitted(case, before, agreed, knowledge)
     if before is not None and not remark and _describes_the_same(before, agreed, knowledge):
-        if before.knowledge.provenance != knowledge.provenance:  # keeps the values, states the new provenance
+        stated = _changed(before.knowledge, knowledge)
+        if stated:  # keeps the values, states what is new
             values = values_text(before.times, before.channels)
-            knowledge = msgspec.structs.replace(before.knowledge, provenance=knowledge.provenance)
-            return _put(case, values, knowledge, check, f"reproduced; {PROVENANCE} was changed since")
+            new = {"provenance": knowledge.provenance, "work": knowledge.work, "made_with": knowledge.made_with}
+            knowledge = msgspec.structs.replace(before.knowledge, **new)
+            return _put(case, values, knowledge, check, f"reproduced; {'; '.join(stated)}")
         share = f"reproduced, farthest off by {largest_share(before, agreed):.2g} of the stated uncertainty"
         return Regenerated(case.name, "confirmed", len(agreed.channels), knowledge.horizon_s, share)
     return _put(case, values, knowledge, check, remark)
@@ -118,8 +121,20 @@ def _knowledge(
         scene=scene_digest(case, case.run.variant(recipe.variant)),
         routes=tuple(route.title for route in routes),
         made_with=tuple(dict.fromkeys(route.made_with for route in routes if route.made_with)),
+        work={run: counts for route in routes for run, counts in route.work.items()},
         channels=agreed.known,
     )
+
+
+def _changed(before: Knowledge, now: Knowledge) -> list[str]:
+    """What a reproduced reference states otherwise than before, in words: its provenance, and the work of its runs."""
+    found = [f"{PROVENANCE} was changed since"] if before.provenance != now.provenance else []
+    if now.work.keys() - before.work.keys():
+        return [*found, "the work of its runs was not counted"]
+    for run, then in before.work.items():
+        for count, old, new in changes(then, now.work.get(run, then)):
+            found.append(f"{run} took {old} {count}, now {new}")
+    return found
 
 
 def _provenance(case: Case) -> str:

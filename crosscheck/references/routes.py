@@ -7,7 +7,7 @@ which is executed only here.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -21,6 +21,7 @@ from crosscheck.library.case import CaseError, Comparison, ComparisonSide, Varia
 from crosscheck.library.code import function_of
 from crosscheck.library.find import Case
 from crosscheck.library.recipe import ReferenceRecipe, ReferenceRoute
+from crosscheck.library.work import Counts, StoredWork, key
 from crosscheck.records.archive import read
 from crosscheck.records.kinds import RunRecord
 from crosscheck.running.job import MAIN
@@ -35,8 +36,9 @@ from flexmb.typing import Real
 class RouteSignals:
     """The result of a route at the reference's times: channels (T, k) with their U, in SI and World axes.
 
-    `title` describes the route. `engine` and its integrator `method` are "" for a file of the case.
-    `made_with` is the engine's version. A `witness` has to agree, and does not say how well the numbers are known.
+    `title` describes the route, `work` counts what each of its efforts took, by the keys of reference.toml. `engine`
+    and its integrator `method` are "" for a file of the case. `made_with` is the engine's version. A `witness` has to
+    agree, and does not say how well the numbers are known.
     """
 
     name: str
@@ -48,6 +50,7 @@ class RouteSignals:
     channels: Mapping[str, Real]
     uncertainties: Mapping[str, Uncertainty]
     witness: bool = False
+    work: StoredWork = field(default_factory=dict)
 
     def independent_of(self, other: RouteSignals) -> bool:
         """Whether the two are of different codes, or of one code by two engines with two integrators.
@@ -80,7 +83,7 @@ def run_routes(
     results = _engine_results(case, recipe, times, provider, limits, scheduler, listener)
     for place, route in enumerate(recipe.routes):
         if route.engine:
-            answers[place] = _of_engine(case, route, results[_name(place)])
+            answers[place] = _of_engine(case, route, route.variant or recipe.variant, results[_name(place)])
     return [answers[place] for place in sorted(answers)]
 
 
@@ -140,7 +143,7 @@ def _as_variant(variant: Variant, given: str, name: str, route: ReferenceRoute, 
     )
 
 
-def _of_engine(case: Case, route: ReferenceRoute, result: Result) -> RouteSignals:
+def _of_engine(case: Case, route: ReferenceRoute, variant: str, result: Result) -> RouteSignals:
     if result.status != "finished":
         what = f"{result.variant}, {result.engine}, {result.status}: {result.message}"
         raise CaseError(f"{case.folder / 'run.toml'}: [reference] {what}: correct the route, or take another")
@@ -156,6 +159,11 @@ def _of_engine(case: Case, route: ReferenceRoute, result: Result) -> RouteSignal
         channels={name: result.values(name) for name in given},
         uncertainties={name: result.doubt(name, across=True) for name in given},
         witness=route.witness,
+        work={
+            key(result.engine, variant, run.effort): Counts(run.evaluations, run.steps, run.operations)
+            for run in result.runs
+            if run.evaluations or run.steps or run.operations
+        },
     )
 
 

@@ -9,6 +9,7 @@ from crosscheck.judging.applicable import Inapplicable
 from crosscheck.judging.outcome import NO_REFERENCE, Absence, LostControl, SessionOutcome
 from crosscheck.judging.results import CaseResults
 from crosscheck.judging.unjudged import UnjudgedChannels, grouped
+from crosscheck.judging.work import work_of
 from crosscheck.library.case import Provenance
 from crosscheck.report.mutations import CaseScore
 from crosscheck.report.peaks import PeakRow, largest_loads
@@ -41,6 +42,7 @@ class CaseView:
     unjudged: list[UnjudgedChannels]
     lost_controls: list[LostControl]
     unreferenced: str
+    work_changes: list[str]
     timings: list[dict[str, Any]]
     peaks: list[PeakRow]
     mutation: CaseScore | None
@@ -61,14 +63,15 @@ def case_view(case: CaseResults, outcome: SessionOutcome, place: CasePlace, muta
         variants=[_variant_view(case, variant) for variant in record.run.variants],
         ok=record.case not in outcome.idle and all(verdict.ok for verdict in verdicts) and not (lost or lost_controls),
         whole=summary_cell(verdicts),
-        comparisons=comparison_blocks(verdicts),
-        conservation=conservation_block(verdicts),
-        controls=control_block(verdicts),
+        comparisons=comparison_blocks(outcome, verdicts),
+        conservation=conservation_block(outcome, verdicts),
+        controls=control_block(outcome, verdicts),
         lost_controls=lost_controls,
         absences=[absence for absence in outcome.absences if absence.case == record.case],
         inapplicable=[absence for absence in outcome.inapplicable if absence.case == record.case],
         unjudged=grouped(channel for channel in outcome.unjudged if channel.case == record.case),
         unreferenced=f"It {NO_REFERENCE.format(record.case)}" if record.case in outcome.unreferenced else "",
+        work_changes=[str(change) for change in outcome.work_changes if change.case == record.case],
         timings=_timings(case),
         peaks=largest_loads(case),
         mutation=mutation,
@@ -102,10 +105,8 @@ def _timings(case: CaseResults) -> list[dict[str, Any]]:
         {
             "engine": engine,
             "variant": variant,
-            "effort": result.finest.effort,
+            "work": work_of(result.finest),
             "compile_s": result.finest.compile_s,
-            "wall_s": result.finest.wall_s,
-            "evaluations": result.finest.evaluations,
             "support": result.finest.support,
         }
         for (variant, engine, role), result in case.results.items()

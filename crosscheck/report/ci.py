@@ -16,6 +16,7 @@ from flexmb.output.printable import printable
 from flexmb.output.whole import write_whole
 
 VERDICTS = "verdicts.json"
+WORK = ("work_a", "work_b")  # keys of a verdict's record: what the runs of its sides took
 SHOWN = 40
 # Characters with a meaning in Markdown: in a line (an underscore only at a word's edge), and list signs at its start.
 MARKDOWN = re.compile(r"[\\`*\[\]<>|~&$!]|(?<![^\W_])_|_(?![^\W_])|^[#+-]|(?<=^\d)[.)]")
@@ -23,7 +24,11 @@ MARKDOWN = re.compile(r"[\\`*\[\]<>|~&$!]|(?<![^\W_])_|_(?![^\W_])|^[#+-]|(?<=^\
 
 def write_verdicts(outcome: SessionOutcome, file: Path) -> None:
     """verdicts.json: a list with one record for each verdict."""
-    records = [{**msgspec.to_builtins(verdict), "ok": verdict.ok} for verdict in outcome.all]
+    records = [
+        {**msgspec.to_builtins(verdict), "ok": verdict.ok}
+        | {key: msgspec.to_builtins(work) for key, work in zip(WORK, outcome.work_of(verdict), strict=True)}
+        for verdict in outcome.all
+    ]
     write_whole(file, msgspec.json.format(msgspec.json.encode(records), indent=1) + b"\n")
 
 
@@ -53,6 +58,9 @@ def write_summary(outcome: SessionOutcome, file: Path) -> None:
     lines += _table("Beyond stale figures", outcome.outgrown, lambda verdict: verdict.grown)
     if outcome.strict:
         lines += _table("No accepted figures", outcome.unrecorded, lambda verdict: "`crosscheck run --accept` records")
+    if outcome.work_changes:
+        lines += ["", "## Other work than recorded", "", *(f"- {_flat(str(each))}" for each in outcome.work_changes)]
+    lines += _work(outcome)
     if outcome.absences:
         lines += ["", "## What did not run to the end, and why", ""]
         for absence in outcome.absences:
@@ -76,6 +84,20 @@ def write_summary(outcome: SessionOutcome, file: Path) -> None:
     if outcome.broken:
         lines += ["", "## Lines that are no records", "", *(f"- {_flat(line)}" for line in outcome.broken)]
     write_whole(file, "\n".join(lines) + "\n")
+
+
+def _work(outcome: SessionOutcome) -> list[str]:
+    """What the finest runs took, up to `SHOWN` of them."""
+    if not outcome.work:
+        return []
+    lines = ["", "## Work of the finest runs", "", "| case | variant | engine | effort | work |"]
+    lines += ["|---|---|---|---|---|"]
+    for (case, variant, engine), work in list(outcome.main_work.items())[:SHOWN]:
+        cells = (case, variant, engine, work.effort, work.words(engine))
+        lines.append(f"| {' | '.join(map(_flat, cells))} |")
+    if len(outcome.main_work) > SHOWN:
+        lines += ["", f"... and {len(outcome.main_work) - SHOWN} more, in results.json."]
+    return lines
 
 
 def add_differences(differences: Differences, file: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
+from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.judging.verdict import SEVERITY, WORSE, Verdict
 from crosscheck.library.channels import part_of
 
@@ -65,6 +66,7 @@ class VerdictLine:
     E: str
     U: str
     goal: str
+    work: str
     reason: str
 
 
@@ -92,16 +94,16 @@ def anchor(number: int) -> str:
     return f"verdict-{number}"
 
 
-def comparison_blocks(verdicts: Iterable[Verdict]) -> list[Block]:
+def comparison_blocks(outcome: SessionOutcome, verdicts: Iterable[Verdict]) -> list[Block]:
     """A block for each comparison: kinds of channels against pairs of engines."""
     groups: dict[str, list[Numbered]] = {}
     for number, verdict in enumerate(verdicts):
         if verdict.kind == "comparison":
             groups.setdefault(verdict.comparison, []).append((number, verdict))
-    return [_comparison(name, group) for name, group in groups.items()]
+    return [_comparison(outcome, name, group) for name, group in groups.items()]
 
 
-def conservation_block(verdicts: Iterable[Verdict]) -> Block | None:
+def conservation_block(outcome: SessionOutcome, verdicts: Iterable[Verdict]) -> Block | None:
     """Conserved quantities against engines."""
     group = [(number, verdict) for number, verdict in enumerate(verdicts) if verdict.kind == "conservation"]
     if not group:
@@ -112,10 +114,10 @@ def conservation_block(verdicts: Iterable[Verdict]) -> Block | None:
         lambda verdict: f"{verdict.comparison.capitalize()}, {verdict.variant_a}",
         lambda verdict: verdict.engine_a,
     )
-    return _block("Conservation", note, group, table)
+    return _block(outcome, "Conservation", note, group, table)
 
 
-def control_block(verdicts: Iterable[Verdict]) -> Block | None:
+def control_block(outcome: SessionOutcome, verdicts: Iterable[Verdict]) -> Block | None:
     """Negative controls: which faults were noticed by which engines."""
     group = [(number, verdict) for number, verdict in enumerate(verdicts) if verdict.kind == "control"]
     if not group:
@@ -124,25 +126,25 @@ def control_block(verdicts: Iterable[Verdict]) -> Block | None:
     table = _table(
         group, lambda verdict: verdict.comparison, lambda verdict: f"{verdict.engine_a}, against {verdict.engine_b}"
     )
-    return _block("Negative controls", note, group, table)
+    return _block(outcome, "Negative controls", note, group, table)
 
 
-def _comparison(name: str, group: list[Numbered]) -> Block:
+def _comparison(outcome: SessionOutcome, name: str, group: list[Numbered]) -> Block:
     first = group[0][1]
     note = "" if first.expected == "agree" else f"Expected here: {first.expected}, because {first.expected_reason}"
     return _block(
-        name, note, group, _table(group, lambda verdict: _kind(verdict.channel), lambda verdict: verdict.pair)
+        outcome, name, note, group, _table(group, lambda verdict: _kind(verdict.channel), lambda verdict: verdict.pair)
     )
 
 
-def _block(title: str, note: str, group: list[Numbered], table: VerdictTable) -> Block:
+def _block(outcome: SessionOutcome, title: str, note: str, group: list[Numbered], table: VerdictTable) -> Block:
     verdicts = [verdict for _, verdict in group]
     order = sorted(group, key=lambda item: item[1].ok)  # what is not as expected first
-    lines = tuple(_line(number, verdict) for number, verdict in order)
+    lines = tuple(_line(outcome, number, verdict) for number, verdict in order)
     return Block(title, note, summary_cell(verdicts), _worst(verdicts), table, lines)
 
 
-def _line(number: int, verdict: Verdict) -> VerdictLine:
+def _line(outcome: SessionOutcome, number: int, verdict: Verdict) -> VerdictLine:
     what = verdict.comparison if verdict.kind != "comparison" else ""
     return VerdictLine(
         anchor=anchor(number),
@@ -152,6 +154,7 @@ def _line(number: int, verdict: Verdict) -> VerdictLine:
         E=_number(verdict.E),
         U=_number(verdict.U),
         goal=_goal(verdict),
+        work=_work(outcome, verdict),
         reason=_reason(verdict),
     )
 
@@ -171,6 +174,12 @@ def _goal(verdict: Verdict) -> str:
     """The goal, with that of the case where an engine claims a looser one."""
     looser = f" (of the case: {_number(verdict.case_goal)})" if verdict.loosened else ""
     return _number(verdict.goal) + looser
+
+
+def _work(outcome: SessionOutcome, verdict: Verdict) -> str:
+    """What the runs behind a verdict took, each side on its own."""
+    sides = zip((verdict.engine_a, verdict.engine_b), outcome.work_of(verdict), strict=True)
+    return "; ".join(f"{engine}: {work.words(engine)}" for engine, work in sides if work is not None)
 
 
 def _number(value: float | None) -> str:

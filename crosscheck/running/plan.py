@@ -344,4 +344,6 @@ def recorded_reference(case: Case, run: RunFile) -> RecordedReference | None:
         channels={name: pack(rows) for name, rows in stored.channels.items()},
         uncertainties={name: known.uncertainty for name, known in stored.knowledge.channels.items()},
         routes=stored.knowledge.routes,
+        work=stored.knowledge.work,
+        made_with=stored.knowledge.made_with,
     )

@@ -41,29 +41,34 @@ def solve_rung(model: Model, job: Job, effort: Effort, blank: RunRecord, stores_
         blank, effort=effort.label, effort_kind=effort.kind, effort_method=effort.method, effort_value=effort.value
     )
     try:
-        run, wall_s = _timed(model, job, effort, record.rung == COARSEST)
+        run, wall_s, cpu_s = _timed(model, job, effort, record.rung == COARSEST)
         channels = _determined(run) if len(run.times) else {}
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # as in `solve_job`, but the other efforts may still work
         return Solved(msgspec.structs.replace(record, status="failed", message=describe(error)))
     record = msgspec.structs.replace(
-        record, status=run.status, message=run.message, wall_s=wall_s, evaluations=run.evaluations,
+        record, status=run.status, message=run.message, wall_s=wall_s, cpu_s=cpu_s,
+        evaluations=run.evaluations, steps=run.steps, operations=run.operations,
         undetermined=run.undetermined, events=run.events,
     )  # fmt: skip
     stored = {name: values for name, values in channels.items() if stores_all or name in job.kept}
     return Solved(record, run.times if len(run.times) else None, stored, run.envelope)
 
 
-def _timed(model: Model, job: Job, effort: Effort, coarsest: bool) -> tuple[Trajectory, float]:
-    """The run and its time (s), the shortest if it was repeated. BrokenContract if a repetition differs."""
+def _timed(model: Model, job: Job, effort: Effort, coarsest: bool) -> tuple[Trajectory, float, float]:
+    """The run, its time (s), the shortest if it was repeated, and the processor time (s) of its first call.
+
+    BrokenContract if a repetition differs.
+    """
     first_part = Run(job.times[: max(2, ceil(FIRST_PART * len(job.times)))], job.linear)
     begun = model.simulate(first_part, effort) if coarsest and not job.lean else None
-    start = time.perf_counter()
+    start, start_cpu = time.perf_counter(), time.process_time()
     run = model.simulate(Run(job.times, job.linear, job.role == ENVELOPE), effort)
     took_s = time.perf_counter() - start  # by this process' clock: the engine's `wall_s` may claim anything
+    cpu_s = time.process_time() - start_cpu
     if run.status != "finished" or job.lean:
-        return run, run.wall_s
+        return run, run.wall_s, cpu_s
     wall_s = run.wall_s
     repeats = repeats_of(min(took_s, wall_s)) if job.role == MAIN else 1  # no chart shows the times of other roles
     for _ in range(repeats - 1):
@@ -72,7 +77,7 @@ def _timed(model: Model, job: Job, effort: Effort, coarsest: bool) -> tuple[Traj
         wall_s = min(wall_s, again.wall_s)
     if begun is not None and repeats == 1:
         _require_the_same(begun, model.simulate(first_part, effort))
-    return run, wall_s
+    return run, wall_s, cpu_s
 
 
 def repeats_of(seconds: float) -> int:

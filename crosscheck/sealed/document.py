@@ -30,7 +30,12 @@ The file is one JSON object. Every key:
     and of engines that joined that theirs are as others have them;
   - ``peaks`` (left out unless the session had ``--envelope``): by "variant | engine | channel" the largest magnitude
     over all steps of a run, and its time (s);
-  - ``runs``: by "variant | engine | role": ``status``, ``effort``, ``wall_s`` and ``compile_s`` of the finest effort.
+  - ``runs``: by "variant | engine | role": ``status``, ``effort``, ``wall_s`` and ``compile_s`` of the finest effort,
+    ``cpu_s`` (of the whole call, on all threads), ``evaluations``, ``steps`` and ``operations``; what the engine does
+    not count is left out and named in ``uncounted``. They are the work of every verdict whose key names engine and
+    variant, with the role "control:<comparison>" for the first side of a control;
+  - ``work_changes`` (left out if empty): by "variant | engine | effort | count" what a run that made the stored
+    reference took, and what it takes now, where they are more than a tenth apart.
 
 Figures have four digits, times three.
 """
@@ -47,6 +52,7 @@ from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.judging.peaks import has_envelopes, peaks
 from crosscheck.judging.results import CaseResults, Result, Session
 from crosscheck.judging.verdict import Status, Verdict, VerdictKind
+from crosscheck.judging.work import work_of
 from crosscheck.library.claims import Claims
 from crosscheck.library.digests import file_digest
 from crosscheck.records.kinds import ENVELOPE, ContractState, RunStatus
@@ -82,6 +88,11 @@ class SealedRun(_SealedPart, frozen=True, kw_only=True):
     effort: str = ""
     wall_s: float = 0.0
     compile_s: float = 0.0
+    cpu_s: float = 0.0
+    evaluations: int = 0
+    steps: int = 0
+    operations: int = 0
+    uncounted: tuple[str, ...] = ()
 
 
 class SealedCase(_SealedPart, frozen=True, kw_only=True):
@@ -96,6 +107,7 @@ class SealedCase(_SealedPart, frozen=True, kw_only=True):
     unjudged: dict[str, str] = {}
     unreferenced: bool = False
     claims: Claims | None = None
+    work_changes: dict[str, tuple[int, int]] = {}
 
 
 class Origin(_SealedPart, frozen=True, kw_only=True):
@@ -179,6 +191,11 @@ def _case(case: CaseResults, outcome: SessionOutcome) -> SealedCase:
         unjudged={channel.key: channel.reason for channel in outcome.unjudged if channel.case == name},
         unreferenced=name in outcome.unreferenced,
         claims=None if case.case.claims == Claims() else case.case.claims,
+        work_changes={
+            " | ".join((change.variant, change.engine, change.effort, change.count)): (change.then, change.now)
+            for change in outcome.work_changes
+            if change.case == name
+        },
     )
 
 
@@ -202,9 +219,12 @@ def _verdict(verdict: Verdict) -> SealedVerdict:
 def _run(result: Result) -> SealedRun:
     if not result.runs:
         return SealedRun(status=result.status)
-    finest = result.finest
-    wall, compiling = (_short(seconds, 3) or 0.0 for seconds in (finest.wall_s, finest.compile_s))
-    return SealedRun(status=result.status, effort=finest.effort, wall_s=wall, compile_s=compiling)
+    finest, work = result.finest, work_of(result.finest)
+    wall, compiling, cpu = (_short(seconds, 3) or 0.0 for seconds in (finest.wall_s, finest.compile_s, finest.cpu_s))
+    return SealedRun(
+        status=result.status, effort=finest.effort, wall_s=wall, compile_s=compiling, cpu_s=cpu,
+        evaluations=work.evaluations, steps=work.steps, operations=work.operations, uncounted=work.uncounted,
+    )  # fmt: skip
 
 
 def _short(number: float | None, digits: int) -> float | None:

@@ -34,6 +34,7 @@ def print_outcome(console: Console, outcome: SessionOutcome, verbosity: Verbosit
     """
     if verbosity is Verbosity.VERBOSE and outcome.all:
         console.print(_verdict_table(outcome.all))
+        console.print(_work_table(outcome))
     if verbosity is not Verbosity.QUIET:
         if outcome.all:
             console.print(words(_inventory(outcome)), soft_wrap=True)
@@ -107,6 +108,9 @@ def _not_in_order(outcome: SessionOutcome) -> Iterator[Text]:
         yield marked("!", "yellow", f"{_place(verdict)} {verdict.grown}")
     for verdict in outcome.outgrown:
         yield marked("!", "yellow", f"{_place(verdict)}: {verdict.grown}")
+    for change in outcome.work_changes:
+        mark = (sign, colour) if change.dearer else ("!", "yellow")
+        yield marked(*mark, str(change))
     if outcome.stale:
         yield marked("!", "yellow", _stale(outcome.stale))
     for verdict in outcome.unrecorded if outcome.strict else ():
@@ -192,6 +196,18 @@ def _verdict_table(verdicts: Sequence[Verdict]) -> Listing:
         colour = "green" if good == len(group) else "red"
         cells = [_count(group, status) for status in occurring]
         table.add(case, name, words(f"{good} of {len(group)}", colour), *cells)
+    return table
+
+
+def _work_table(outcome: SessionOutcome) -> Listing:
+    """What the finest runs took; what an engine does not count is said, with its name."""
+    times, counts = figures("solve", "processor"), figures("evaluations", "steps", "operations")
+    table = Listing(*names("case", "variant", "engine", "effort"), *times, *counts)
+    for (case, variant, engine), work in outcome.main_work.items():
+        made = (work.evaluations, work.steps, work.operations)
+        told = [f"{count:.4g}" if count >= 1e6 else str(count) if count else f"not by {engine}" for count in made]
+        cpu = f"{work.cpu_s:.3g} s" if work.cpu_s else "not recorded"
+        table.add(case, variant, engine, work.effort, f"{work.wall_s:.3g} s", cpu, *told)
     return table
 
 

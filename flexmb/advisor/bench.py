@@ -11,20 +11,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexmb.advisor.methods import RunMethod, operations, simulated_within
+from flexmb.advisor.methods import RunMethod, simulated_within
 from flexmb.advisor.models import Model, built, flexible_bodies
 from flexmb.advisor.modes import mode_count
 from flexmb.advisor.quantity import Quantity, Signals, measured
-from flexmb.closure import dynamics as closed
 from flexmb.closure.closures import ClosureError
 from flexmb.jain import cost
-from flexmb.jit.counting import count
+from flexmb.run.operations import of_evaluation, of_run
 from flexmb.scene.schema import Scene
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.algorithms import ALGORITHMS
 from flexmb.system.compile import compile
 from flexmb.system.system import System
-from flexmb.tables.state import pack
 
 SAMPLES = 401
 MAX_STEPS = 400_000
@@ -97,7 +95,7 @@ class Bench:
             system = self.system(model)
             if isinstance(system, str):
                 raise ValueError(system)
-            self._operations[model, algorithm] = _operations(system, algorithm)
+            self._operations[model, algorithm] = of_evaluation(system, algorithm)
         return self._operations[model, algorithm]
 
     def algorithm(self, model: Model) -> Algorithm:
@@ -140,19 +138,9 @@ class Bench:
             signals=measured(self.wanted, done) if len(done.t) else {},
             message="" if done.finished else done.message,
             evaluations=taken.evaluations,
-            operations=operations(method, each, system.nq + system.nu + 1, taken),
+            operations=of_run(method.integrator, each, system.nq + system.nu + 1, taken),
             seconds=taken.run_s,
             cut=cut,
             reached=len(done.t) / len(self.times),
             accepted=taken.accepted_steps / max(taken.accepted_steps + taken.rejected_steps, 1),
         )
-
-
-def _operations(system: System, algorithm: Algorithm) -> int:
-    state = system.initial_state
-    y = pack(state)
-    if system.closures is not None:
-        chain = system.closures.chain(algorithm)
-        return count(closed.rhs, 0.0, y, np.zeros_like(y), chain, 0).operations.total
-    chosen = ALGORITHMS[algorithm]
-    return count(chosen.kernel(), 0.0, y, *chosen.fresh(system)).operations.total

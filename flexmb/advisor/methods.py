@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.settings import Settings
-from flexmb.run.run_arrays import Statistics
+from flexmb.run.operations import of_run
 from flexmb.run.simulate import run_of_many
 from flexmb.run.trajectory import Trajectory
 from flexmb.system.algorithm import Algorithm
@@ -27,15 +27,6 @@ STEPS = (2.5, 1.25, 0.6, 0.3, 0.15, 0.075)
 """Fixed steps times the highest frequency; RK4 is stable up to 2.83."""
 SOME_STEPS = 20
 """Steps after which it is known what a step of an implicit method costs."""
-
-
-COMPLEX = 4
-"""Operations of an evaluation in complex numbers relative to one in real numbers."""
-
-
-FACTORS, ANSWER = 4.0, 0.5
-"""Operations of the factors of Newton's method by the recursion, and of their use for each evaluation, relative to an
-evaluation: measured on a chain of 10 beams of 5 modes, complex numbers included."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +82,7 @@ def simulated_within(
         if first.status is not Status.MAX_STEPS:
             return first, False
         size = system.nq + system.nu + 1
-        steps = max(SOME_STEPS, int(SOME_STEPS * most / operations(method, each, size, first.statistics)))
+        steps = max(SOME_STEPS, int(SOME_STEPS * most / of_run(method.integrator, each, size, first.statistics)))
     done = simulated(system, times, method, min(steps, max_steps))
     return done, done.status is Status.MAX_STEPS and steps < max_steps
 
@@ -128,17 +119,3 @@ def _ladder(integrator: Integrator, frequency: float, algorithm: Algorithm) -> t
         return tuple(RunMethod(integrator.name, step / frequency, algorithm) for step in STEPS)
     tolerances = TOLERANCES[:-3] if integrator.linearises else TOLERANCES
     return tuple(RunMethod(integrator.name, rtol, algorithm) for rtol in tolerances)
-
-
-def operations(method: RunMethod, each: int, size: int, done: Statistics) -> float:
-    """Operations of a run: `each` for an evaluation of the accelerations, `size` entries of the state.
-
-    A Jacobian counts as one evaluation in complex numbers for each of its columns. Linear algebra is counted by its
-    leading terms, with one substitution for each evaluation. A run of a method with Jacobians that formed none solved
-    by the recursion (`flexmb.entry.stiff_part`).
-    """
-    if INTEGRATORS[method.integrator].linearises and done.jacobians == 0:
-        return each * (done.evaluations * (1.0 + ANSWER) + done.factorisations * FACTORS)
-    cubic, square = INTEGRATORS[method.integrator].algebra
-    evaluations = done.evaluations + COMPLEX * size * done.jacobians
-    return float(each * evaluations + cubic * size**3 * done.factorisations + square * size**2 * done.evaluations)

@@ -9,7 +9,7 @@ import numpy as np
 from rich.console import Console
 
 from crosscheck.judging.outcome import SessionOutcome, conclude
-from crosscheck.judging.results import collect
+from crosscheck.judging.results import Session, collect
 from crosscheck.judging.verdict import Verdict
 from crosscheck.library.accepted import Accepted
 from crosscheck.library.case import RunFile
@@ -93,8 +93,16 @@ def judged(
     undetermined: tuple[str, ...] | msgspec.UnsetType = (),
     **others: object,
 ) -> SessionOutcome:
-    """The outcome of a session that left these runs; `others` are more of its case's record, `basis` its scenes',
-    of whose channels the motion leaves some `undetermined`."""
+    """The outcome of a session that left these runs; see `session_of`."""
+    return conclude(session_of(text, runs, accepted, asked, basis, undetermined, **others), strict)
+
+
+def session_of(
+    text: str, runs: Iterable[RunRecord], accepted: Accepted | None = None, asked: tuple[str, ...] = (),
+    basis: str = "", undetermined: tuple[str, ...] | msgspec.UnsetType = (), **others: object,
+) -> Session:
+    """A session that left these runs; `others` are more of its case's record, `basis` its scenes', of whose channels
+    the motion leaves some `undetermined`."""
     whole = run_file(text)
     run = select(whole, asked)
     info = VariantInfo(level="rigid", drawing=None, basis=basis, undetermined=undetermined)
@@ -103,7 +111,7 @@ def judged(
         case="made/made", run=run, provenance=None, readme="", variants=infos, accepted=accepted or {}, asked=asked,
         joined=joining(whole, asked), **others,
     )  # fmt: skip
-    return conclude(collect([case, *runs]), strict)
+    return collect([case, *runs])
 
 
 def single(outcome: SessionOutcome) -> Verdict:

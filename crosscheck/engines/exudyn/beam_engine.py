@@ -185,7 +185,7 @@ class BeamModel:
             status=solution.status, message=solution.message, times=run.times[: len(states.times)],
             markers={marker.name: self._marker(marker, states)[0] for marker in self.beam.scene.markers},
             loads=self._loads(states), drives=self._drives(states), wall_s=solution.wall_s,
-            evaluations=solution.evaluations,
+            evaluations=solution.evaluations, steps=solution.steps,
         )  # fmt: skip
 
     def _multiplier(self, states: States, hold: int) -> Real:

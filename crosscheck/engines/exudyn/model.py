@@ -62,7 +62,7 @@ class ExudynModel:
             wheel_loads={name: loads[name] for name in self.assembly.wheels},
             drives=drives(self.assembly, states), energy=energy, momentum=momentum,
             connectors=held.between, hinge_forces=held.along,
-            wall_s=solution.wall_s, evaluations=solution.evaluations, **linear.as_outputs,
+            wall_s=solution.wall_s, evaluations=solution.evaluations, steps=solution.steps, **linear.as_outputs,
         )  # fmt: skip
 
     def _still_closed(self, solution: ExudynSolution) -> ExudynSolution:

@@ -49,6 +49,9 @@ From a first step that is far too long Exudyn falls to the smallest one and acce
 """
 
 
+Counts = tuple[int, int]  # evaluations, or steps of Newton's method, and steps in time
+
+
 @dataclass(frozen=True)
 class ExudynSolution:
     """The result of a run, cut to its good samples."""
@@ -58,6 +61,7 @@ class ExudynSolution:
     message: str
     wall_s: float
     evaluations: int
+    steps: int
 
 
 class Recorder:
@@ -89,12 +93,12 @@ def integrate(assembly: Assembly | PlanarBeam, times: Real, effort: Effort) -> E
     run = _fixed if effort.method in IMPLICIT + FIXED_EXPLICIT else _explicit
     if effort.method in IMPLICIT and _starts_accelerated(assembly):
         _tell_accelerations(assembly)
-    states, evaluations, wall = run(assembly, times, effort)
+    states, (evaluations, steps), wall = run(assembly, times, effort)
     good = _good_samples(assembly, states, times)
     if good == len(times):
-        return ExudynSolution(states, "finished", "", wall, evaluations)
+        return ExudynSolution(states, "finished", "", wall, evaluations, steps)
     last = f"last good output at t = {times[good - 1]:g} s of {times[-1]:g} s"
-    return ExudynSolution(states.cut(good), "diverged", f"{effort.label}: {last}", wall, evaluations)
+    return ExudynSolution(states.cut(good), "diverged", f"{effort.label}: {last}", wall, evaluations, steps)
 
 
 def _starts_accelerated(assembly: Assembly | PlanarBeam) -> bool:
@@ -121,18 +125,18 @@ def _settings(assembly: Assembly | PlanarBeam):
     return settings
 
 
-def _fixed(assembly: Assembly | PlanarBeam, times: Real, effort: Effort) -> tuple[States, int, float]:
+def _fixed(assembly: Assembly | PlanarBeam, times: Real, effort: Effort) -> tuple[States, Counts, float]:
     """A fixed-step run; a sensor takes the samples, which fall on steps.
 
     Only the attempt that is taken counts as its time (s): who knows the scene sets what converges.
     """
     for tolerance, modified in _newton_settings(assembly) if effort.method in IMPLICIT else NEWTON_SETTINGS[:1]:
         start = perf_counter()
-        states, evaluations = _fixed_steps(assembly, times, effort, tolerance, modified)
+        states, counts = _fixed_steps(assembly, times, effort, tolerance, modified)
         wall = perf_counter() - start
         if len(states.times) >= len(times):
             break
-    return states, evaluations, wall
+    return states, counts, wall
 
 
 def _newton_settings(assembly: Assembly | PlanarBeam) -> Sequence[tuple[float, bool]]:
@@ -145,7 +149,7 @@ def _in_space(assembly: Assembly | PlanarBeam) -> bool:
 
 def _fixed_steps(
     assembly: Assembly | PlanarBeam, times: Real, effort: Effort, tolerance: float, modified: bool
-) -> tuple[States, int]:
+) -> tuple[States, Counts]:
     shop = assembly.shop
     settings = _settings(assembly)
     control = settings.timeIntegration
@@ -168,7 +172,8 @@ def _fixed_steps(
 
     shop.mbs.SetSensorParameter(assembly.sampler, "sensorUserFunction", sample)
     _run(assembly, settings)
-    return recorder.states(), shop.mbs.sys["dynamicSolver"].it.newtonStepsCount
+    made = shop.mbs.sys["dynamicSolver"].it
+    return recorder.states(), (made.newtonStepsCount, made.currentStepIndex - 1)
 
 
 def _run(assembly: Assembly | PlanarBeam, settings, update: bool = False) -> bool:
@@ -182,7 +187,7 @@ def _run(assembly: Assembly | PlanarBeam, settings, update: bool = False) -> boo
         return False
 
 
-def _explicit(assembly: Assembly | PlanarBeam, times: Real, effort: Effort) -> tuple[States, int, float]:
+def _explicit(assembly: Assembly | PlanarBeam, times: Real, effort: Effort) -> tuple[States, Counts, float]:
     """Error-controlled steps, restarted at every sample: the solver does not stop at output times by itself."""
     begin = perf_counter()
     shop = assembly.shop
@@ -211,7 +216,7 @@ def _explicit(assembly: Assembly | PlanarBeam, times: Real, effort: Effort) -> t
             break
     data.SetSystemState(start, initial)
     states = recorder.states()
-    return states, 6 * steps, perf_counter() - begin
+    return states, (6 * steps, steps), perf_counter() - begin
 
 
 def _good_samples(assembly: Assembly | PlanarBeam, states: States, times: Real) -> int:

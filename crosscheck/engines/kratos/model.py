@@ -48,7 +48,8 @@ class KratosModel:
         # The load at the start depends on the mesh: it is that of the scene's own at every effort, as in `evaluate`.
         samples = [self.evaluate(), *(_snapshot(mesh.layout, state) for state in states[1:])]
         return stack(
-            run.times, samples, message=message, wall_s=wall, evaluations=steps.iterations, work=np.array(work)
+            run.times, samples, message=message, wall_s=wall, evaluations=steps.iterations, steps=steps.count,
+            work=np.array(work),
         )
 
 

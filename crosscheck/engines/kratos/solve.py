@@ -13,14 +13,15 @@ class ImplicitSteps:
     """Fixed steps of backward differences, which begin anew where a load jumps.
 
     The differences need two states before the first. Those are made from the accelerations there, or a first step
-    would be of first order. `work`: that of loads and a prescribed rotation so far (J), by the trapezoidal rule.
+    would be of first order. `count`: steps made so far; `work`: that of loads and a prescribed rotation so far (J), by
+    the trapezoidal rule.
     """
 
     def __init__(self, mesh: Mesh, step: float) -> None:
         self._mesh, self._step = mesh, step
         self._strategy, self._scheme = mesh.strategy()
         self._jumps = sorted({t for load in mesh.layout.scene.loads for t in jumps(load.function)})
-        self._count = self.iterations = 0
+        self.count = self.iterations = 0
         self.work = 0.0
         mesh.set_out()
         self._begin()
@@ -29,12 +30,12 @@ class ImplicitSteps:
     @property
     def t(self) -> float:
         """Time (s) of the last step."""
-        return self._count * self._step
+        return self.count * self._step
 
     def go_on(self) -> bool:
         """One step; False where it has no solution."""
         mesh, before = self._mesh, self.t
-        self._count += 1
+        self.count += 1
         mesh.part.CloneTimeStep(self.t)
         self._applied = mesh.load(self.t, -1.0)
         mesh.turn(before, self.t)

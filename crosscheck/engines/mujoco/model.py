@@ -74,7 +74,9 @@ class MujocoModel:
             linear = self._linear
             matrices = () if linear is None else (linear.at(t, *state) for t, state in at)
             asked = outputs(run.linear if linear is not None else (), matrices)
-        return stack(run.times, samples, message=message, wall_s=wall, evaluations=stages * steps, linear=asked)
+        return stack(
+            run.times, samples, message=message, wall_s=wall, evaluations=stages * steps, steps=steps, linear=asked
+        )
 
     def _initial(self) -> mujoco.MjData:
         data = mujoco.MjData(self._tree.model)

@@ -48,6 +48,7 @@ GOOD = Trajectory(
     drives={"pivot": numbers(2), "wheel": numbers(1)}, hinge_forces={"spring": 4.0 * numbers(1)},
     energy={kind: place + numbers() for place, kind in enumerate(("kinetic", "strain", "spring", "gravity"))},
     momentum=5.0 * numbers(6), work=7.0 * numbers(), wall_s=0.25, evaluations=123,
+    steps=45, operations=678,
 )  # fmt: skip
 
 
@@ -60,6 +61,7 @@ def arrays(run: Trajectory) -> dict[str, np.ndarray]:
 def test_a_sound_run_passes_whole_in_arrays_of_its_own() -> None:
     run = checked_run(GOOD, TIMES, SCENE)
     assert (run.status, run.message, run.wall_s, run.evaluations) == ("finished", "fine", 0.25, 123)
+    assert (run.steps, run.operations) == (45, 678)
     given, found = arrays(GOOD), arrays(run)
     assert found.keys() == given.keys() and len(found) == 24
     for name, values in given.items():
@@ -188,6 +190,8 @@ BREACHES: list[tuple[dict[str, Any], str]] = [
     ({"wall_s": -1.0}, "wall_s is -1: a finite number from 0 is expected"),
     ({"wall_s": np.inf}, "wall_s is inf: a finite number from 0 is expected"),
     ({"evaluations": -1}, "evaluations is -1: a whole number from 0 is expected"),
+    ({"steps": -1}, "steps is -1: a whole number from 0 is expected"),
+    ({"operations": 1e6}, "operations is 1000000.0: a whole number from 0 is expected"),
     ({"evaluations": 1.0}, "evaluations is 1.0: a whole number from 0 is expected"),
     ({"evaluations": True}, "evaluations is True: a whole number from 0 is expected"),
     ({"evaluations": LARGEST_COUNT + 1}, "evaluations is 9223372036854775808: a whole number from 0 is expected"),

@@ -127,6 +127,32 @@ def test_a_reference_that_is_reproduced_is_left_as_it_is(copied: Path) -> None:
     assert {name: (copied / name).stat().st_mtime_ns for name in before} == before
 
 
+def test_a_reference_keeps_the_work_of_its_runs_and_notices_other_work(copied: Path) -> None:
+    """Counts are those of the machine's arithmetic, so a tenth is alike; more is told and written anew."""
+    work = load_reference(copied).knowledge.work
+    assert {run.partition(",")[0] for run in work} == {"fine (rigid)", "stepper (rigid)"}
+    run, counts = next(iter(work.items()))
+    assert counts.evaluations > 0
+    for share, done in ((1.05, "confirmed"), (0.5, "would be written")):
+        text = (copied / KNOWLEDGE).read_text(encoding="utf-8")
+        line = next(line for line in text.splitlines() if line.startswith(f'"{run}"'))
+        edit(copied / KNOWLEDGE, line, f'"{run}" = {{evaluations = {int(share * counts.evaluations)}}}')
+        found = regenerate(copied, check=True)
+        assert found.done == done
+        edit(copied / KNOWLEDGE, f'"{run}" = {{evaluations = {int(share * counts.evaluations)}}}', line)
+    assert f"{run} took {counts.evaluations // 2} evaluations, now {counts.evaluations}" in found.remark
+
+
+def test_a_reference_without_counts_gets_them_and_keeps_its_values(copied: Path) -> None:
+    before, values = load_reference(copied).knowledge, (copied / VALUES).read_bytes()
+    text = (copied / KNOWLEDGE).read_text(encoding="utf-8")
+    edit(copied / KNOWLEDGE, text[text.index("[work]") : text.index("[channels")], "")
+    assert not load_reference(copied).knowledge.work
+    assert "was not counted" in regenerate(copied).remark
+    assert load_reference(copied).knowledge == before
+    assert (copied / VALUES).read_bytes() == values
+
+
 def test_check_writes_nothing_and_workers_do_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = case_folder(tmp_path)
     monkeypatch.setattr("crosscheck.references.routes.run_planned", run_planned)

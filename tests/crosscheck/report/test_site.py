@@ -99,7 +99,7 @@ def test_few_stops_of_the_tabulator(written: tuple[SessionOutcome, Path]) -> Non
 
 def test_a_block_says_its_worst(written: tuple[SessionOutcome, Path]) -> None:
     verdicts = written[0].verdicts["pendulum/single"]
-    for block in comparison_blocks(verdicts):
+    for block in comparison_blocks(written[0], verdicts):
         inside = [verdict for verdict in verdicts if verdict.kind == "comparison" and verdict.comparison == block.title]
         assert len(block.lines) == len(inside)
         assert block.open == any(not each.ok for each in inside)

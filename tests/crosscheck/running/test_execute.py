@@ -103,10 +103,11 @@ def cut(run: Trajectory, status: Any = "diverged", count: int = 2, message: str 
 
 
 def on_a_clock(monkeypatch: pytest.MonkeyPatch, seconds: float) -> None:
-    """Every look at the worker's clock is so many seconds after the one before."""
-    clock = itertools.count(10.0, seconds)
+    """Every look at the worker's clock is so many seconds after the one before, and at that of its processor half."""
+    clock, processor = itertools.count(10.0, seconds), itertools.count(0.0, seconds / 2.0)
+    clocks = SimpleNamespace(perf_counter=lambda: next(clock), process_time=lambda: next(processor))
     for timed in (module, of_rungs):
-        monkeypatch.setattr(timed, "time", SimpleNamespace(perf_counter=lambda: next(clock)))
+        monkeypatch.setattr(timed, "time", clocks)
 
 
 @pytest.fixture(autouse=True)
@@ -255,9 +256,15 @@ def test_an_engine_is_asked_about_the_start_and_the_duration_of_the_job() -> Non
     assert asked == [pytest.approx(0.2)]
 
 
+def counting(run: Trajectory, count: int) -> Trajectory:
+    return replace(
+        run, wall_s=0.5 + count, evaluations=40 + count, steps=20 + count, operations=count, message="fine"
+    )
+
+
 def test_a_run_is_recorded_in_every_field(monkeypatch: pytest.MonkeyPatch) -> None:
     on_a_clock(monkeypatch, 2.5)
-    actor = Actor(play=lambda run, count: replace(run, wall_s=0.5 + count, evaluations=40 + count, message="fine"))
+    actor = Actor(play=counting)
     ladder = LADDER[:3]
     found = emitted(actor, efforts=ladder, role="control:mass")
     assert found[0] == "compiling"
@@ -269,7 +276,8 @@ def test_a_run_is_recorded_in_every_field(monkeypatch: pytest.MonkeyPatch) -> No
         assert msgspec.structs.replace(record, times=None, channels={}) == the(
             "finished", "fine", role="control:mass", version="1.0", support="rigid for flexible", made_by=key,
             effort=effort.label, effort_kind="step", effort_method="rk4", effort_value=effort.value, rung=rung,
-            rungs=3, compile_s=2.5, wall_s=0.5 + count, evaluations=40 + count,
+            rungs=3, compile_s=2.5, wall_s=0.5 + count, cpu_s=1.25, evaluations=40 + count, steps=20 + count,
+            operations=count,
         )  # fmt: skip
         wanted = channels_of(Pendulum(SCENE).simulate(Run(TIMES), effort))
         assert record.channels.keys() == wanted.keys()
