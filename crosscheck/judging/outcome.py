@@ -10,12 +10,13 @@ from crosscheck.engines.registry import BUILT_IN
 from crosscheck.judging.applicable import Inapplicable, Kind, set_apart
 from crosscheck.judging.case_verdicts import judge
 from crosscheck.judging.figures import recordable
+from crosscheck.judging.margins import FlaggedGoal, flagged
 from crosscheck.judging.results import CaseResults, Session
 from crosscheck.judging.unjudged import Unjudged, unjudged
 from crosscheck.judging.verdict import Verdict
 from crosscheck.judging.work import MAIN, RunKey, WorkChange, keys_of, work_by_run, work_changes
 from crosscheck.library.claims import ClaimedFailure, ClaimedGoals
-from crosscheck.library.work import Work
+from crosscheck.library.work import RunWork
 from crosscheck.records.kinds import ENVELOPE, ContractState
 from flexmb.kept import kept
 from flexmb.run.channels import matches
@@ -78,7 +79,7 @@ class SessionOutcome:
     lost_controls: tuple[LostControl, ...] = ()
     contracts: Mapping[str, ContractState] = field(default_factory=dict)
     work_changes: tuple[WorkChange, ...] = ()
-    work: Mapping[RunKey, Work] = field(default_factory=dict)
+    work: Mapping[RunKey, RunWork] = field(default_factory=dict)
 
     @property
     def all(self) -> list[Verdict]:
@@ -167,15 +168,20 @@ class SessionOutcome:
             verdict for verdict in self.all if verdict.ok and verdict.accepted is None and recordable(verdict, BUILT_IN)
         ]
 
-    def work_of(self, verdict: Verdict) -> tuple[Work | None, Work | None]:
+    def work_of(self, verdict: Verdict) -> tuple[RunWork | None, RunWork | None]:
         """What the finest runs of a verdict's sides took; None where there was no run, as of a reference."""
         a, b = map(self.work.get, keys_of(verdict))
         return a, None if verdict.kind == "conservation" else b
 
     @property
-    def main_work(self) -> dict[tuple[str, str, str], Work]:
+    def main_work(self) -> dict[tuple[str, str, str], RunWork]:
         """What the finest runs took that are no controls and no refinements, by case, variant and engine."""
         return {key[:3]: work for key, work in self.work.items() if key[3] == MAIN}
+
+    @kept
+    def flagged(self) -> list[FlaggedGoal]:
+        """Goals that are met by too little or by too much, by case and comparison."""
+        return list(flagged(self.all))
 
     @property
     def dearer(self) -> list[WorkChange]:

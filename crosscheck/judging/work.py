@@ -17,7 +17,7 @@ import numpy as np
 from crosscheck.engines.registry import OWN_CODE
 from crosscheck.judging.results import CaseResults
 from crosscheck.judging.verdict import Verdict
-from crosscheck.library.work import Counted, Counts, Work, changes, key
+from crosscheck.library.work import Counted, Counts, RunWork, changes, key
 from crosscheck.records.kinds import RunRecord
 from crosscheck.records.packing import unpack
 
@@ -50,15 +50,15 @@ class WorkChange:
         return f"{where}: {more} work than recorded: {self.now} {self.count}, {self.then} for the reference{stale}"
 
 
-def work_of(run: RunRecord) -> Work:
+def work_of(run: RunRecord) -> RunWork:
     """What one recorded run took."""
-    return Work(
+    return RunWork(
         effort=run.effort, wall_s=run.wall_s, cpu_s=run.cpu_s, evaluations=run.evaluations, steps=run.steps,
         operations=run.operations,
     )  # fmt: skip
 
 
-def work_by_run(case: CaseResults) -> Iterator[tuple[RunKey, Work]]:
+def work_by_run(case: CaseResults) -> Iterator[tuple[RunKey, RunWork]]:
     """What the finest run of each result took, by case, variant, engine and role."""
     for (variant, engine, role), result in case.results.items():
         if result.runs:

@@ -46,7 +46,7 @@ def changes(then: Counts, now: Counts) -> Iterator[tuple[Counted, int, int]]:
             yield name, before, after
 
 
-class Work(Counts, frozen=True, forbid_unknown_fields=True, omit_defaults=True, kw_only=True):
+class RunWork(Counts, frozen=True, forbid_unknown_fields=True, omit_defaults=True, kw_only=True):
     """What a run took at its `effort`: `wall_s` of the solve alone, `cpu_s` of processor time on all threads, outputs
     included, and its counts."""
 

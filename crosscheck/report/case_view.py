@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from crosscheck.judging.applicable import Inapplicable
+from crosscheck.judging.margins import FlaggedGoal
 from crosscheck.judging.outcome import NO_REFERENCE, Absence, LostControl, SessionOutcome
 from crosscheck.judging.results import CaseResults
 from crosscheck.judging.unjudged import UnjudgedChannels, grouped
@@ -43,6 +44,7 @@ class CaseView:
     lost_controls: list[LostControl]
     unreferenced: str
     work_changes: list[str]
+    flagged: list[FlaggedGoal]
     timings: list[dict[str, Any]]
     peaks: list[PeakRow]
     mutation: CaseScore | None
@@ -72,6 +74,7 @@ def case_view(case: CaseResults, outcome: SessionOutcome, place: CasePlace, muta
         unjudged=grouped(channel for channel in outcome.unjudged if channel.case == record.case),
         unreferenced=f"It {NO_REFERENCE.format(record.case)}" if record.case in outcome.unreferenced else "",
         work_changes=[str(change) for change in outcome.work_changes if change.case == record.case],
+        flagged=[each for each in outcome.flagged if each.case == record.case],
         timings=_timings(case),
         peaks=largest_loads(case),
         mutation=mutation,

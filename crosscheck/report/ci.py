@@ -8,6 +8,7 @@ from pathlib import Path
 
 import msgspec
 
+from crosscheck.judging.margins import WORDS
 from crosscheck.judging.outcome import NO_REFERENCE, SessionOutcome
 from crosscheck.judging.unjudged import grouped
 from crosscheck.judging.verdict import STATUSES, Verdict
@@ -60,6 +61,15 @@ def write_summary(outcome: SessionOutcome, file: Path) -> None:
         lines += _table("No accepted figures", outcome.unrecorded, lambda verdict: "`crosscheck run --accept` records")
     if outcome.work_changes:
         lines += ["", "## Other work than recorded", "", *(f"- {_flat(str(each))}" for each in outcome.work_changes)]
+    if outcome.flagged:
+        lines += ["", "## Margins of goals", "", "| case | comparison | goals | which | extreme |"]
+        lines += ["|---|---|---|---|---|"]
+        for each in outcome.flagged[:SHOWN]:
+            cells = (_flat(each.case), _flat(each.comparison), f"{each.channels} of {each.judged}", WORDS[each.flag])
+            extreme = f"{_code(each.channel)}: {each.extreme:.2g}, goal {each.goal:.2g}"
+            lines.append(f"| {' | '.join(cells)} | {extreme} |")
+        if len(outcome.flagged) > SHOWN:
+            lines += ["", f"... and {len(outcome.flagged) - SHOWN} more, in results.json."]
     lines += _work(outcome)
     if outcome.absences:
         lines += ["", "## What did not run to the end, and why", ""]

@@ -35,7 +35,9 @@ The file is one JSON object. Every key:
     not count is left out and named in ``uncounted``. They are the work of every verdict whose key names engine and
     variant, with the role "control:<comparison>" for the first side of a control;
   - ``work_changes`` (left out if empty): by "variant | engine | effort | count" what a run that made the stored
-    reference took, and what it takes now, where they are more than a tenth apart.
+    reference took, and what it takes now, where they are more than a tenth apart;
+  - ``margins`` (left out if empty): by comparison the goals that are met by a factor below 3 ("narrow") or above 1e4
+    ("wide"): how many of how many agreements, the extreme margin, its channel and its goal.
 
 Figures have four digits, times three.
 """
@@ -48,6 +50,7 @@ from pathlib import Path
 import msgspec
 
 from crosscheck.judging.figures import key_of
+from crosscheck.judging.margins import Flag
 from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.judging.peaks import has_envelopes, peaks
 from crosscheck.judging.results import CaseResults, Result, Session
@@ -95,6 +98,16 @@ class SealedRun(_SealedPart, frozen=True, kw_only=True):
     uncounted: tuple[str, ...] = ()
 
 
+class SealedMargin(_SealedPart, frozen=True, kw_only=True):
+    """How many `channels` of the `judged` agreements have the flag; the `extreme` margin with its channel and goal."""
+
+    channels: int
+    judged: int
+    extreme: float
+    channel: str
+    goal: float
+
+
 class SealedCase(_SealedPart, frozen=True, kw_only=True):
     """A case: digests of files and scenes, verdicts by comparison, runs, what is not applicable and what not judged."""
 
@@ -108,6 +121,7 @@ class SealedCase(_SealedPart, frozen=True, kw_only=True):
     unreferenced: bool = False
     claims: Claims | None = None
     work_changes: dict[str, tuple[int, int]] = {}
+    margins: dict[str, dict[Flag, SealedMargin]] = {}
 
 
 class Origin(_SealedPart, frozen=True, kw_only=True):
@@ -196,7 +210,19 @@ def _case(case: CaseResults, outcome: SessionOutcome) -> SealedCase:
             for change in outcome.work_changes
             if change.case == name
         },
+        margins=_margins(case, outcome),
     )
+
+
+def _margins(case: CaseResults, outcome: SessionOutcome) -> dict[str, dict[Flag, SealedMargin]]:
+    found: dict[str, dict[Flag, SealedMargin]] = {}
+    for each in outcome.flagged:
+        if each.case == case.case.case:
+            found.setdefault(each.comparison, {})[each.flag] = SealedMargin(
+                channels=each.channels, judged=each.judged, extreme=float(f"{each.extreme:.3g}"), channel=each.channel,
+                goal=each.goal,
+            )  # fmt: skip
+    return found
 
 
 def _verdict(verdict: Verdict) -> SealedVerdict:

@@ -48,6 +48,8 @@ def print_outcome(console: Console, outcome: SessionOutcome, verbosity: Verbosit
         for absence in outcome.inapplicable if verbosity is Verbosity.VERBOSE else ():
             text = f"{absence.case}, {absence.where}, {absence.engine} not applicable: {absence.reason}"
             console.print(marked("○", "dim", text), soft_wrap=True)
+        for each in outcome.flagged if verbosity is Verbosity.VERBOSE else ():
+            console.print(marked("○", "dim", str(each)), soft_wrap=True)
         for group in grouped(outcome.unjudged) if verbosity is Verbosity.VERBOSE else ():
             console.print(marked("○", "dim", str(group)), soft_wrap=True)
         if len(shown) < len(lines):

@@ -8,12 +8,15 @@ from types import ModuleType
 
 import pytest
 
-from tests.repo import catalogue, examples, gallery, motions, threads
+from tests.repo import catalogue, examples, gallery, margins, motions, threads
 from tests.repo.project import ROOT
 from tests.repo.snippets import PAGES
 
 
-@pytest.mark.parametrize("maker", [catalogue, examples, gallery, motions, threads], ids=lambda maker: maker.PAGE.name)
+WRITTEN = [catalogue, examples, gallery, margins, motions, threads]
+
+
+@pytest.mark.parametrize("maker", WRITTEN, ids=lambda maker: maker.PAGE.name)
 def test_a_page_is_what_its_generator_writes(maker: ModuleType) -> None:
     assert maker.PAGE.read_text(encoding="utf-8") == maker.page(), f"run `python -m {maker.__name__}`"
 

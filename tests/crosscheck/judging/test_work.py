@@ -10,7 +10,7 @@ import pytest
 from crosscheck.engines.contract import Effort, Run
 from crosscheck.engines.native import NativeEngine
 from crosscheck.judging.outcome import SessionOutcome
-from crosscheck.library.work import Counts, Work, changes, key
+from crosscheck.library.work import Counts, RunWork, changes, key
 from crosscheck.records.kinds import RecordedReference, ReferenceGoals, RunRecord
 from crosscheck.records.packing import pack
 from crosscheck.report.ci import write_summary
@@ -75,7 +75,7 @@ def test_every_verdict_knows_the_work_of_its_runs() -> None:
     outcome = session(operations=7)
     pair = next(verdict for verdict in outcome.all if verdict.comparison == "both")
     one, two = outcome.work_of(pair)
-    assert one == Work(effort="rtol=2", wall_s=0.5, cpu_s=0.75, evaluations=300, steps=30, operations=7)
+    assert one == RunWork(effort="rtol=2", wall_s=0.5, cpu_s=0.75, evaluations=300, steps=30, operations=7)
     assert two is not None
     assert two.uncounted == ("operations",)
     assert two.words("two").endswith("operations not counted by two")
