@@ -78,7 +78,7 @@ def manufacture(scene: Scene, seed: int, duration_s: float = 1.0, amplitude: flo
     bare = without_motors(scene)
     dense = DenseSystem(bare)
     motion = draw(bare, dense, seed, duration_s, amplitude)
-    drives = Drives(bare, motion)
+    drives = MotionLoads(bare, motion)
     intervals = INTERVALS[0]
     while (left := drives.left(duration_s, intervals)) > EXACT and intervals < INTERVALS[1]:
         if drives.left(duration_s, 2 * intervals) > 0.25 * left:
@@ -93,7 +93,7 @@ def manufacture(scene: Scene, seed: int, duration_s: float = 1.0, amplitude: flo
     return drives.manufactured(duration_s, intervals)
 
 
-class Drives:
+class MotionLoads:
     """The loads of a motion of a scene without motors."""
 
     def __init__(self, bare: Scene, motion: DrawnMotion) -> None:

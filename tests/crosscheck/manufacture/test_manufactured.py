@@ -19,7 +19,7 @@ from crosscheck.library.find import load_case, shipped_folder
 from crosscheck.library.reference import current_reference
 from crosscheck.manufacture.case import sample_times
 from crosscheck.manufacture.doubt import answers
-from crosscheck.manufacture.drives import Drives, Manufactured, manufacture, without_motors
+from crosscheck.manufacture.drives import Manufactured, MotionLoads, manufacture, without_motors
 from crosscheck.manufacture.held import Held, held
 from crosscheck.manufacture.motion import draw
 from crosscheck.references.regenerate import regenerate
@@ -28,8 +28,9 @@ from flexmb.scene import schema as s
 from flexmb.scene.files import dumps, loads, save_scene
 from tests.crosscheck.manufacture import scenes
 
-SEEDS = [*range(8), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(8, 12))]
-"""By default one of each recipe."""
+QUICK = (0, 1, 2, 6, 7)
+SEEDS = [pytest.param(seed, marks=() if seed in QUICK else pytest.mark.slow) for seed in range(12)]
+"""By default rigid bodies with and without losses and prescribed motions, a beam, a stiffened and a ruthless body."""
 SLOW_SEEDS = range(200)
 FAULT = 1.0 + 1e-4
 TIMES = sample_times(1.0)
@@ -83,7 +84,7 @@ def test_the_bound_covers_coarse_tables() -> None:
     """The exact answers of a motion whose tables are far apart are off by what is stated, and no more than that."""
     bare = without_motors(scenes.scene(0))
     motion = draw(bare, DenseSystem(bare), 0, 1.0, 0.3)
-    coarse = Drives(bare, motion).manufactured(1.0, 8)
+    coarse = MotionLoads(bare, motion).manufactured(1.0, 8)
     times = np.linspace(0.0, 1.0, 9)
     channels, known = answers(coarse, times)
     found = held(engine("native"), coarse.scene, times, channels, known)
@@ -134,25 +135,35 @@ def test_the_command_writes_a_case_that_is_read_and_cannot_be_regenerated(tmp_pa
     assert "is not empty" in CliRunner().invoke(app, words).output
 
 
+@cache
+def rigid(seed: int) -> tuple[s.Scene, dict[str, np.ndarray], dict[str, float]]:
+    found = manufacture(scenes.rigid(seed), seed)
+    return found.scene, *answers(found, TIMES)
+
+
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:Inertia matrix is too close to singular")  # MuJoCo, of gimbals at their zero
 @pytest.mark.parametrize("name", ["native", "pinocchio", "mujoco"])
 def test_two_hundred_trees_through_every_engine_that_takes_them(name: str) -> None:
-    """Every seed within U; a fault in one element noticed by 99 of 100."""
+    """Every seed within U; a fault in one element noticed by 99 of 100. Motions that grow away have no answer."""
     code = engine(name)
     try:
         code.version()
     except EngineMissing as error:
         pytest.skip(str(error))
-    wrong, blind, tried = [], [], 0
+    wrong, blind, refused, tried = [], [], [], 0
     for seed in SLOW_SEEDS:
-        scene = scenes.rigid(seed)
-        found = manufacture(scene, seed)
-        if code.supports(found.scene).kind != "exact":
+        try:
+            scene, channels, known = rigid(seed)
+        except CaseError as error:
+            refused.append((seed, str(error)))
+            continue
+        if code.supports(scene).kind != "exact":
             continue
         tried += 1
-        channels, known = answers(found, TIMES)
-        wrong += [(seed, outside_)] if (outside_ := outside(held(code, found.scene, TIMES, channels, known))) else []
-        blind += [] if outside(held(code, faulty(found.scene, seed), TIMES, channels, known)) else [seed]
+        wrong += [(seed, apart)] if (apart := outside(held(code, scene, TIMES, channels, known))) else []
+        blind += [] if outside(held(code, faulty(scene, seed), TIMES, channels, known)) else [seed]
+    assert len(refused) <= 0.1 * len(SLOW_SEEDS), refused
     assert tried >= 100
     assert not wrong
     assert len(blind) <= 0.01 * tried
