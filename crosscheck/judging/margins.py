@@ -10,12 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 from crosscheck.judging.verdict import Verdict
 
 NARROW, WIDE = 3.0, 1e4
 Flag = Literal["narrow", "wide"]
+FLAGS: tuple[Flag, ...] = get_args(Flag)
 WORDS: dict[Flag, str] = {
     "narrow": f"met by a factor below {NARROW:g}",
     "wide": f"met by a factor above {WIDE:g}: nothing can miss it",
@@ -73,8 +74,8 @@ def flagged(verdicts: Iterable[Verdict]) -> Iterator[FlaggedGoal]:
 
 def flagged_of(case: str, comparison: str, group: list[tuple[float, str, float]]) -> Iterator[FlaggedGoal]:
     """The flags of one comparison from the margin, channel and goal of each of its agreements."""
-    for flag, extreme in (("narrow", min), ("wide", max)):
+    for flag in FLAGS:
         mine = [each for each in group if flag_of(each[0]) == flag]
         if mine:
-            size, channel, goal = extreme(mine)
+            size, channel, goal = min(mine) if flag == "narrow" else max(mine)
             yield FlaggedGoal(case, comparison, flag, len(mine), len(group), size, channel, goal)
