@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from crosscheck.validation.identification import Identified, identified
 from crosscheck.validation.measured_set import Input, MeasuredSet, Series, Standing
-from crosscheck.validation.model import Listener, Model
+from crosscheck.validation.model import Listener, MeasuredModel
 from flexmb.typing import Real
 
 COVERAGE = 2.0  # two standard deviations: 95 of 100 where errors are normal
@@ -174,7 +174,7 @@ def budget(of: MeasuredSet, samples: int = 0, seed: int = 0, listener: Listener 
     found = identified(of, listener) if of.content.fit else None
     of = of if found is None else found.of
     points, nominal, inputs = of.points, of.nominal, of.content.inputs
-    model = Model(of, listener, 2 + 4 * len(inputs) + samples)
+    model = MeasuredModel(of, listener, 2 + 4 * len(inputs) + samples)
     coarse, fine = model.predictions(points, nominal, 0), model.predictions(points, nominal, 1)
     changes, sampled = model.changes(points, inputs), None
     if samples:

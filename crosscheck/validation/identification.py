@@ -20,7 +20,7 @@ from scipy.optimize import least_squares
 
 from crosscheck.library.case_error import CaseError
 from crosscheck.validation.measured_set import FILE, Input, MeasuredSet
-from crosscheck.validation.model import Listener, Model
+from crosscheck.validation.model import Listener, MeasuredModel
 from flexmb.typing import Real
 
 UNSEEN = 1e-8  # ratio of singular values below which readings do not determine a combination of inputs
@@ -46,7 +46,7 @@ def identified(of: MeasuredSet, listener: Listener = lambda done, of: None) -> I
     measured, u_D = np.array([point.measured for point in used]), np.array([of.deviation(point) for point in used])
     free = [i for i, each in enumerate(content.inputs) if each.deviation > 0.0]
     prior = np.array([each.name not in content.fit for each in content.inputs])[free]
-    model = Model(of, listener)
+    model = MeasuredModel(of, listener)
 
     def inputs_at(z: Real) -> list[Input]:
         inputs = list(content.inputs)

@@ -30,7 +30,7 @@ class Changes(NamedTuple):
 
 
 @dataclass
-class Model:
+class MeasuredModel:
     """The functions of `model.py`; `listener` hears how many of the evaluations that are expected are done."""
 
     of: MeasuredSet

@@ -14,7 +14,7 @@ from crosscheck.library.case_error import CaseError
 from crosscheck.validation.budget import budget
 from crosscheck.validation.document import document
 from crosscheck.validation.measured_set import MeasuredSet, find_set, find_sets, read_set, shipped_sets
-from crosscheck.validation.model import Model
+from crosscheck.validation.model import MeasuredModel
 from flexmb.scene.user_code import no_user_code
 
 HEAD = """\
@@ -244,7 +244,7 @@ def test_a_wrong_file_is_refused_by_name(tmp_path: Path, files: dict[str, str], 
 def test_code_may_be_forbidden(tmp_path: Path) -> None:
     """In a block of Python, and by the option."""
     with no_user_code(), pytest.raises(CaseError, match="user code was forbidden"):
-        Model(read_set(made(tmp_path)))
+        MeasuredModel(read_set(made(tmp_path)))
 
 
 def test_the_command_line(tmp_path: Path) -> None:
@@ -281,13 +281,13 @@ def test_two_folders_of_one_name_are_not_mixed_up(tmp_path: Path) -> None:
 def test_shipped_sets_are_whole(name: str) -> None:
     """They read, say what they left out, and load their model."""
     known: MeasuredSet = find_set(name)
-    assert known.content.left_out and known.content.sources and Model(known)
+    assert known.content.left_out and known.content.sources and MeasuredModel(known)
 
 
 def test_a_shipped_model_predicts() -> None:
     """The one that takes least, at its lower effort: speeds after a despin, off by 15 % of the speed before at most."""
     known = find_set("yoyo_despin")
-    predicted = Model(known).predictions(known.points, known.nominal, 0)
+    predicted = MeasuredModel(known).predictions(known.points, known.nominal, 0)
     before = np.array([point.conditions["speed_before_rpm"] for point in known.points])
     assert np.all(np.abs(predicted - [point.measured for point in known.points]) < 0.15 * before)
 
