@@ -12,7 +12,6 @@ from tests.repo import catalogue, examples, gallery, margins, motions, threads
 from tests.repo.project import ROOT
 from tests.repo.snippets import PAGES
 
-
 WRITTEN = [catalogue, examples, gallery, margins, motions, threads]
 
 
