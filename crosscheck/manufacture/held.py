@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from crosscheck.engines.contract import Engine, Run
+from crosscheck.engines.contract import Effort, Engine, Run
 from crosscheck.judging.uncertainty import RungSignal, estimate
 from crosscheck.library.case_error import CaseError
 from flexmb.run.channels import channels_of, distance, family, magnitude
@@ -28,15 +28,16 @@ class Held(NamedTuple):
 
 
 def held(
-    engine: Engine, scene: Scene, times: Real, channels: Mapping[str, Real], known: Mapping[str, float]
-) -> dict[str, Held]:
-    """The channels (T,k) at `times` (T,), known to `known`, that the engine offers, by its own ladder of efforts.
+    engine: Engine, scene: Scene, times: Real, channels: Mapping[str, Real], known: Mapping[str, float],
+    efforts: Sequence[Effort] = (),
+) -> dict[str, Held]:  # fmt: skip
+    """The channels (T,k) at `times` (T,), known to `known`, that the engine offers, by its own ladder or `efforts`.
 
     CaseError where a run does not finish.
     """
     for_scene = getattr(engine, "efforts_for", lambda scene, duration_s: engine.efforts(scene))
     model, runs = engine.compile(scene), []
-    efforts = for_scene(scene, float(times[-1]))
+    efforts = efforts or for_scene(scene, float(times[-1]))
     for effort in efforts:
         run = model.simulate(Run(times), effort)
         if run.status != "finished":
