@@ -6,7 +6,7 @@ displacement without a tip weight is subtracted, as in the test.
 
 import csv
 from functools import cache
-from math import asin, degrees
+from math import asin, degrees, sqrt
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +21,16 @@ BEHIND = {"bending": 0.06, "twist": 0.56}  # place of the weight behind the axis
 
 def predict(points, inputs, effort):
     """Vertical displacements of the tip's middle (% of the semispan), and twists (degrees)."""
+    return [value for value, _ in answers(points, inputs, effort)]
+
+
+def derivatives(points, inputs, effort):
+    """By the place of the weight; by the stiffness of a beam, whose modes change with it, there are differences."""
+    return {"place of the weight": [1e-3 * by_place for _, by_place in answers(points, inputs, effort, True)]}
+
+
+def answers(points, inputs, effort, exact=False):
+    """The prediction of each point, and its derivative by the place of the weight (1/m), if `exact`."""
     masses = {}
     for point in points:
         masses.setdefault(point.series, set()).add(point.conditions["tip_mass_kg"])
@@ -29,7 +39,8 @@ def predict(points, inputs, effort):
         kind, skin = series.partition(",")[0], int("with skin" in series)
         behind = BEHIND[kind] * CHORD + (1e-3 * inputs["place of the weight"] if kind == "twist" else 0.0)
         stiffness = inputs["bending stiffness"], inputs["twist stiffness"]
-        known[series] = rests(kind, tuple(sorted(own)), skin, behind, *stiffness, effort)
+        turned = exact and kind == "twist"  # bending is measured under a weight that is not moved
+        known[series] = rests(kind, tuple(sorted(own)), skin, behind, *stiffness, effort, turned)
     return [known[point.series][point.conditions["tip_mass_kg"]] for point in points]
 
 
@@ -40,8 +51,11 @@ def table(name, skin):
 
 
 @cache
-def rests(kind, masses, skin, behind, bending, twist, effort):
-    """Displacement or twist by weight (kg) less that of none, along the path of equilibria as the weight grows."""
+def rests(kind, masses, skin, behind, bending, twist, effort, exact):
+    """Displacement or twist by weight (kg) less that of none, along the path of equilibria as the weight grows.
+
+    With the derivative by the place of the weight, 0 unless `exact`.
+    """
     scene = wing(skin, behind, bending, twist, effort)
     path = fm.equilibrium_path(scene, "load.mass_kg", [NONE, *masses])
     system = fm.compile(scene)
@@ -50,8 +64,27 @@ def rests(kind, masses, skin, behind, bending, twist, effort):
         state = path.at(mass)[0]
         markers = system.evaluate(state.t, state.q, state.u).markers
         up = markers["leading"].position[2] - markers["trailing"].position[2]
-        values[mass] = markers["middle"].position[2] / SPAN * 100.0 if kind == "bending" else degrees(asin(up / CHORD))
+        value = markers["middle"].position[2] / SPAN * 100.0 if kind == "bending" else degrees(asin(up / CHORD))
+        rate = 0.0
+        if exact:
+            leading, trailing = by_place(scene.with_values({"load.mass_kg": mass}), state)
+            rate = degrees((leading - trailing) / CHORD / sqrt(1.0 - (up / CHORD) ** 2))
+        values[mass] = np.array([value, rate])
     return {mass: values[mass] - values[NONE] for mass in masses}
+
+
+def by_place(scene, state):
+    """How the edges rise as the weight moves backwards (m/m): accelerations stay zero, and displacements follow."""
+    system = fm.compile(scene)
+    numbers = system.parameters(["bolt.parent_position_m.1"])
+    stiffness = system.acceleration_derivatives(state).by_displacement
+    followed = np.linalg.solve(stiffness, numbers.accelerations(state)[:, 0])
+    (seen,) = numbers.evaluate(state).values()
+    rates = system.evaluation_derivatives(state)
+    return [
+        float(rates.markers[name].position.by_displacement[2] @ followed - seen.markers[name].position[2])
+        for name in ("leading", "trailing")
+    ]
 
 
 def wing(skin, behind, bending, twist, effort):

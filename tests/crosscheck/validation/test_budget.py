@@ -271,7 +271,11 @@ def test_a_document_has_every_part(tmp_path: Path) -> None:
 
 def test_two_folders_of_one_name_are_not_mixed_up(tmp_path: Path) -> None:
     """Results and pages are known by the name of the folder."""
-    folders = [str(made(place)) for each in ("a", "b") if not (place := tmp_path / each / "line").mkdir(parents=True)]
+    folders = []
+    for each in ("a", "b"):
+        place = tmp_path / each / "line"
+        place.mkdir(parents=True)
+        folders.append(str(made(place)))
     with pytest.raises(CaseError, match="have the same name"):
         find_sets(folders)
     assert len(find_sets([folders[0], f"{folders[0]}/../line"])) == 1

@@ -43,7 +43,9 @@ def test_the_page_and_the_json_have_the_budget(tmp_path: Path) -> None:
     numbers = document(known)
     assert json.loads((tmp_path / "out" / RESULTS).read_text())[tmp_path.name] == numbers
     script = next(index.parent.glob("*.data.js")).read_text(encoding="utf-8")
-    registered = json.loads(re.fullmatch(r'crosscheck\.register\("case-0", (.*)\);\s*', script)[1])
+    call = re.fullmatch(r'crosscheck\.register\("case-0", (.*)\);\s*', script)
+    assert call is not None
+    registered = json.loads(call[1])
     assert registered["points"] == numbers["points"] and registered["series_of"] == numbers["series"]
     np.testing.assert_allclose(registered["series_of"][0]["shares"], np.array([30.0 * 0.01, 0.09]) / 0.39, rtol=1e-9)
     page = next(file for file in index.parent.glob("*.html") if file != index).read_text(encoding="utf-8")
