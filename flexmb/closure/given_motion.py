@@ -1,4 +1,4 @@
-"""Everything observable of a closed chain whose accelerations and row loads are given, along eight directions at once.
+"""Everything observable of a closed chain whose accelerations and row loads are given, along seven directions at once.
 
 As `flexmb.entry.given_motion` for a tree. The row loads, in cw.row.load, are independent like the accelerations: how
 both depend on the state of a free motion is a matter of the directions (`flexmb.closure.variation`).

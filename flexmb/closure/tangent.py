@@ -1,4 +1,4 @@
-"""Derivatives of a closed chain at given constraint loads, exact to round-off, along eight directions at once.
+"""Derivatives of a closed chain at given constraint loads, exact to round-off, along seven directions at once.
 
 The row loads f are constant, while their directions turn with the bodies: the tree's accelerations under J(q)'f are
 differentiated, and the rates and accelerations of the rows. The change of the loads that keeps the row accelerations
@@ -23,10 +23,9 @@ from flexmb.jain.kinematics import pose_sweep
 from flexmb.jain.loads import drive_loads
 from flexmb.jain.sweeps import bodies, inward, outward
 from flexmb.jit.bundle import bundle
-from flexmb.jit.duals import DUAL, rate, seeded
+from flexmb.jit.duals import DUAL, RATES, rate, seeded
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, kernel, sweep
-from flexmb.jit.lanes import LANES
 from flexmb.jit.wide_arrays import as_duals
 from flexmb.motion.coordinates import load_state, store_slope
 from flexmb.spatial.spatial_vector import scale6, shift_force, times6, times6_t
@@ -108,7 +107,7 @@ def evaluate_held(s, c, w, cc, cw):
         cw.row[r].load = s.cw.row[r].load
     status, left = evaluate(c, w, cc, cw), 2 if is_delicate(s.cc, s.cw) else 1
     while status == OK and left > 0:
-        for lane in range(LANES):
+        for lane in range(RATES):
             _hold_rows(s, cw, lane)
         status = evaluate(c, w, cc, cw)
         left -= 1

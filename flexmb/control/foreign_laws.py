@@ -11,9 +11,8 @@ from math import nan
 
 from flexmb.control.tables import CALLED
 from flexmb.jit.direct import nothing_at, status_at
-from flexmb.jit.duals import rate, seeded
+from flexmb.jit.duals import RATES, rate, seeded
 from flexmb.jit.kernel import helper, sweep
-from flexmb.jit.lanes import LANES
 from flexmb.tables.status import OK
 
 # Relative change of what the law reads over the first step: its fourth power is 1e-12, and 2^-53 over it 1e-13.
@@ -45,7 +44,7 @@ def _along(s, t, i):
         s.output[o.output + j] = p.value[j]
     for j in range(o.states):
         s.change[o.state + j] = p.value[o.outputs + j]
-    for lane in range(LANES):
+    for lane in range(RATES):
         size = _size(s, i, lane)
         if size > 0.0 and status == OK:
             status = _differentiated(s, t, i, lane, STEP / size)

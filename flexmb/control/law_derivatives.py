@@ -17,7 +17,7 @@ from flexmb.control.foreign_laws import ATTEMPTS, ROUNDING, SHORTER, SMOOTH, STE
 from flexmb.control.laws import FILTERED, INTEGRAL
 from flexmb.control.tables import ADDRESSES, Loop, LoopVariation
 from flexmb.control.variation import plain_laws
-from flexmb.jit.lanes import LANES
+from flexmb.jit.duals import RATES
 from flexmb.jit.wide_arrays import as_duals
 from flexmb.scene.control import Controller, GainTable, Pid, Saturation, StateSpace, UserLaw
 from flexmb.system.kinks import NotDifferentiableError, meets
@@ -57,7 +57,7 @@ def law_derivatives(feedback: Feedback, t: float, y: Real, one_sided: bool = Fal
 
 
 def _by_duals(feedback: Feedback, t: float, sensors: int, states: Index) -> Real:
-    """(D+X,S+X), eight columns at a time."""
+    """(D+X,S+X), seven columns at a time."""
     made = feedback.running
     arrays = {
         field.name: as_duals(getattr(made, field.name))
@@ -67,8 +67,8 @@ def _by_duals(feedback: Feedback, t: float, sensors: int, states: Index) -> Real
     dual = LoopVariation(plain=plain_laws(made), address=np.zeros(ADDRESSES, np.int64), **arrays)
     read = [(dual.signal, i) for i in range(sensors)] + [(dual.state, int(i)) for i in states]
     columns = []
-    for first in range(0, len(read), LANES):
-        block = read[first : first + LANES]
+    for first in range(0, len(read), RATES):
+        block = read[first : first + RATES]
         for lane, (array, i) in enumerate(block):
             array[i, 1 + lane] = 1.0
         _raise(feedback, loop.respond(t, dual))

@@ -137,7 +137,7 @@ class PlainLaw:
 
 @bundle
 class LoopVariation:
-    """A closed loop in dual numbers, whose eight lanes carry derivatives along eight directions.
+    """A closed loop in dual numbers, whose lanes carry derivatives along seven directions.
 
     Entries of equal names are those of `Loop`; its helpers are compiled for both. In `address` are the kernels of the
     motion in dual numbers, which find its state themselves: MOTION (t, WORKSPACE), OBSERVING (WORKSPACE, OUTPUTS),

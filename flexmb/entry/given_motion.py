@@ -1,4 +1,4 @@
-"""Everything observable of a motion whose accelerations are given, with derivatives along eight directions at once.
+"""Everything observable of a motion whose accelerations are given, with derivatives along seven directions at once.
 
     x = motion_tangent(system.nq, system.nu)        values and directions of q, u, udot and t, set by the caller
     status = observe_given(x, system.constants, w, out)

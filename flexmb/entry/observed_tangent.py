@@ -17,7 +17,7 @@ class OutputsTangent(Outputs):
 
 
 def outputs_tangent(out: Outputs, room: Real | None = None) -> OutputsTangent:
-    """Dual outputs of the shapes and markers of `out`; one per thread. room (m,9): the memory of them all."""
+    """Dual outputs of the shapes and markers of `out`; one per thread. room (m,8): the memory of them all."""
     count = len(out.every)
     every, drives = (as_duals(out.every), as_duals(out.drives)) if room is None else (room[:count], room[count:])
     shapes = {name: getattr(out, name).shape for name in _PARTS}

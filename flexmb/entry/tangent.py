@@ -1,7 +1,7 @@
-"""Derivatives of the equations of motion along eight directions in one evaluation, exact to round-off.
+"""Derivatives of the equations of motion along seven directions in one evaluation, exact to round-off.
 
 The kernels of the recursion are compiled once more for a workspace whose numbers are duals (`flexmb.jit.duals`), which
-carry derivatives along eight directions (forward differentiation). No differences are formed, so that nothing cancels.
+carry derivatives along seven directions (forward differentiation). No differences are formed, so that nothing cancels.
 
 y = [q, u, work] as in `flexmb.entry.articulated.rhs`. The constants must be those of the system (`System.constants`),
 not `System.recursion_constants`, in which bodies may be reduced: here the modes of all bodies are eliminated

@@ -17,7 +17,7 @@ The modes of a body:
 How `explicit` orders its operations (`flexmb.jit.kernel.by_width`, by the types of the arguments):
 
     right-looking   one scene in double precision: long rows without mutual dependence fill vector registers
-    left-looking    lanes (eight copies of a scene at once) and duals (eight derivatives at once): every number is a
+    left-looking    lanes (eight copies of a scene at once) and duals (seven derivatives at once): every number is a
                     vector already, and each row is stored once only
 
 The hinge of a body (`flexmb.jain.hinge_solve.eliminate`):

@@ -8,7 +8,7 @@ tables.py       arrays of bundles inside kernels
 lanes.py        eight copies of a number as one value, and masks: kernels for eight scenes at once
 lane_functions.py  elementary functions of lanes
 sine_cosine.py  sine and cosine of floats and lanes, without a call
-duals.py        a number and its derivatives along eight directions: eight columns of a Jacobian at once
+duals.py        a number and its derivatives along seven directions: seven columns of a Jacobian at once
 wide_arrays.py  arrays of lanes and duals
 pointer.py      kernels as arguments of kernels
 direct.py       kernels called by address, from Python and from kernels

@@ -4,8 +4,8 @@ Numba's own arrays have owners, strides and reference counts, which cost time in
 to, at compilation and in a run. Kernels do not need them: the bundle keeps its arrays, and they are contiguous. In a
 kernel a table is used like an array (`c.body[k].parent`, `w.pff[k, n, i] = x`, `U[m, m + 1 : n]`, `a.shape[0]`); a
 nested array of a record is a table with constant extents. Indices are not checked, and negative ones do not count from
-the end. The floats of a record with a field PADDING are lanes, duals or complex, depending on the length of their last
-axis: see `flexmb.jit.wide_arrays`.
+the end. The floats of a record whose last field is one of PADDING are lanes, duals or complex numbers, as the name of
+that field says: see `flexmb.jit.wide_arrays`.
 """
 
 from __future__ import annotations
@@ -34,8 +34,9 @@ from flexmb.jit.duals import DUAL
 from flexmb.jit.lanes import LANE
 
 WORD, BYTE = ir.IntType(64), ir.IntType(8)
-PADDING = "padding"  # the last field of records whose floats are lanes, duals or complex
-_WIDE = {LANE.width: LANE, DUAL.width: DUAL, complex_numbers.WIDTH: complex_numbers.COMPLEX}
+PADDING: dict[types.Type, str] = {LANE: "of_lanes", DUAL: "of_duals", complex_numbers.COMPLEX: "of_complex"}
+"""Name of the last field of records whose floats are such numbers. Lanes and duals are equally long."""
+_WIDE = {name: number for number, name in PADDING.items()}
 
 
 @cache
@@ -64,8 +65,9 @@ class RowType(types.Type):
         kind, shape = self.record.fields[name].type, ()
         if isinstance(kind, types.NestedArray):
             kind, shape = kind.dtype, kind.shape
-        if kind == types.float64 and PADDING in self.record.fields:
-            kind, shape = _WIDE[shape[-1]], shape[:-1]
+        number = _WIDE.get(next(reversed(self.record.fields)))
+        if kind == types.float64 and number is not None:
+            kind, shape = number, shape[:-1]
         return kind, shape
 
 

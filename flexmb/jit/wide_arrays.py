@@ -10,33 +10,33 @@ from typing import Any
 
 import numpy as np
 
-from flexmb.jit.complex_numbers import WIDTH
-from flexmb.jit.duals import DualType
-from flexmb.jit.lanes import BYTES, LANES
+from flexmb.jit.complex_numbers import COMPLEX, WIDTH
+from flexmb.jit.duals import DUAL
+from flexmb.jit.lanes import BYTES, LANE
 from flexmb.jit.tables import PADDING
 
 
-def wide_dtype(dtype: np.dtype, width: int = LANES) -> np.dtype:
-    """Type of the records: floats first, so that each lane value is aligned to BYTES, then integers."""
+def wide_dtype(dtype: np.dtype, number: Any = LANE) -> np.dtype:
+    """Type of the records: floats first, so that each lane value or dual is aligned to BYTES, then integers."""
     if dtype == np.float64:
         return dtype
     floats, others = list[Any](), list[Any]()
     for name in dtype.names or ():
         base, shape = dtype[name].subdtype or (dtype[name], ())
         if base == np.float64:
-            floats.append((name, base, (*shape, width)))
+            floats.append((name, base, (*shape, _width(number))))
         else:
             others.append((name, base, shape))
     if not dtype.names or not floats:
         return dtype
     size = np.dtype([*floats, *others]).itemsize
-    return np.dtype([*floats, *others, (PADDING, np.uint8, (BYTES - size % BYTES,))])
+    return np.dtype([*floats, *others, (PADDING[number], np.uint8, (BYTES - size % BYTES,))])
 
 
-def wide_zeros(shape: tuple[int, ...], dtype: Any = np.float64, width: int = LANES) -> Any:
-    """Zeros (*shape, width) of floats, or (*shape,) of records or integers."""
-    dtype = wide_dtype(np.dtype(dtype), width)
-    shape = (*shape, width) if dtype == np.float64 else shape
+def wide_zeros(shape: tuple[int, ...], dtype: Any = np.float64, number: Any = LANE) -> Any:
+    """Zeros (*shape, width) of floats of such numbers, or (*shape,) of records or integers; aligned to BYTES."""
+    dtype = wide_dtype(np.dtype(dtype), number)
+    shape = (*shape, _width(number)) if dtype == np.float64 else shape
     size = prod(shape) * dtype.itemsize
     room = np.zeros(size + BYTES, np.uint8)
     start = -room.ctypes.data % BYTES
@@ -60,17 +60,22 @@ def in_lanes(copies: list[Any]) -> Any:
 
 def as_duals(array: Any) -> Any:
     """The same numbers as duals with zero derivatives."""
-    return _widened(array, DualType.width)
+    return _widened(array, DUAL)
 
 
 def as_complex(array: Any) -> Any:
     """The same numbers as complex ones with zero imaginary parts."""
-    return _widened(array, WIDTH)
+    return _widened(array, COMPLEX)
 
 
-def _widened(array: Any, width: int) -> Any:
-    """The same numbers, each the first of `width` floats, the others zero."""
-    out = wide_zeros(array.shape, array.dtype, width)
+def _width(number: Any) -> int:
+    """Floats in a number."""
+    return WIDTH if number == COMPLEX else int(number.width)
+
+
+def _widened(array: Any, number: Any) -> Any:
+    """The same numbers, each the first of the floats of such a number, the others zero."""
+    out = wide_zeros(array.shape, array.dtype, number)
     if array.dtype == np.float64:
         out[..., 0] = array
     elif array.dtype.names is None:

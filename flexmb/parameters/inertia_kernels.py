@@ -1,9 +1,8 @@
-"""The regressor of inverse dynamics: LANES columns in one evaluation, with unit rates of as many parameters."""
+"""The regressor of inverse dynamics: RATES columns in one evaluation, with unit rates of as many parameters."""
 
 from flexmb.entry.articulated import inverse_dynamics
-from flexmb.jit.duals import rate, seeded
+from flexmb.jit.duals import RATES, rate, seeded
 from flexmb.jit.kernel import helper, kernel
-from flexmb.jit.lanes import LANES
 from flexmb.jit.strips import ROW
 from flexmb.parameters.inertia import COUPLING, DAMPING, GYRATION, MASS, MOMENT, RIGID, STIFFNESS
 
@@ -19,8 +18,8 @@ def regressor(t, y, rates, Y, places, c, w, x):
         w.state[i] = y[i]
     place = places.place
     parameters = place.shape[0]
-    for first in range(0, parameters, LANES):
-        count = min(LANES, parameters - first)
+    for first in range(0, parameters, RATES):
+        count = min(RATES, parameters - first)
         for lane in range(count):
             _seed(c, place, first + lane, lane)
         inverse_dynamics(w.time[0], w.state, rates, c, w, x.tau, x.hinges)

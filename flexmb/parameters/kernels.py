@@ -19,10 +19,9 @@ from flexmb.entry.observation import Outputs, observe
 from flexmb.entry.observed_tangent import OutputsTangent, outputs_tangent
 from flexmb.entry.tangent import TangentWorkspace, tangent_workspace
 from flexmb.jit.bundle import bundle
-from flexmb.jit.duals import DUAL, rate, seeded
+from flexmb.jit.duals import DUAL, RATES, rate, seeded
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, kernel
-from flexmb.jit.lanes import LANES
 from flexmb.jit.wide_arrays import as_duals
 from flexmb.parameters.tables import DualConstants
 from flexmb.spatial.spatial_vector import store6, times6
@@ -78,7 +77,7 @@ def dual_outputs(out: Outputs) -> OutputsTangent:
 
 @kernel
 def slopes(t, y, dy, out, c, w):
-    """out (n,LANES): derivatives of dy/dt of y = [q, u, work] (n,) by the parameters and along dy (n,LANES); a status
+    """out (n,RATES): derivatives of dy/dt of y = [q, u, work] (n,) by the parameters and along dy (n,RATES); a status
     code."""
     take(t, y, dy, w)
     status = slope(w.time[0], w.state, w.slope, c, w)
@@ -151,14 +150,14 @@ def take(t, y, dy, w):
     """Set time, and the state with its derivatives."""
     hold(t, y, w)
     for i in range(y.shape[0]):
-        for lane in range(LANES):
+        for lane in range(RATES):
             x = w.state[i]
             w.state[i] = x + dy[i, lane] * (seeded(x, lane) - x)
 
 
 @helper
 def give(x, out):
-    """Write the derivatives of duals (n,) to out (n,LANES)."""
+    """Write the derivatives of duals (n,) to out (n,RATES)."""
     for i in range(x.shape[0]):
-        for lane in range(LANES):
+        for lane in range(RATES):
             out[i, lane] = rate(x[i], lane)

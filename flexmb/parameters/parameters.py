@@ -20,7 +20,7 @@ import numpy as np
 
 from flexmb.closure.tables import Closed
 from flexmb.jit.direct import Direct, direct
-from flexmb.jit.lanes import LANES
+from flexmb.jit.duals import RATES
 from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR, VOID
 from flexmb.kept import kept
 from flexmb.parameters import kernels
@@ -60,7 +60,7 @@ class Parameters:
     """Numbers of a scene, and derivatives by them; made by `System.parameters`. Threads may share it.
 
     names (P,); values (P,); reached (P,): whether the tables depend on a number at all; errors (P,): estimates of the
-    relative errors of the derivatives of the tables; blocks: the tables in dual numbers, LANES parameters each;
+    relative errors of the derivatives of the tables; blocks: the tables in dual numbers, RATES parameters each;
     initial_state (nq+nu+1,P): d[q, u, work]/dp of the scene's state at t = 0, for closed chains of the nearest one that
     closes all closures.
 
@@ -122,7 +122,7 @@ class Parameters:
         if spare is not None and spare[0]._found._structure == self._found._structure:
             moving = np.any(self._of_tables, axis=1) | np.any(spare[0]._of_tables, axis=1)
             if all(
-                put(each, spare[0]._found.tables, tables, is_diagonal, rates[:, LANES * b : LANES * (b + 1)], moving)
+                put(each, spare[0]._found.tables, tables, is_diagonal, rates[:, RATES * b : RATES * (b + 1)], moving)
                 for b, each in enumerate(spare[1])
             ):
                 return spare[1]
@@ -166,7 +166,7 @@ class Parameters:
         slopes = np.empty(dy.shape)
         for start, bound in self._bound:
             place = slice(start, start + bound.count)
-            out, along = np.empty((len(y), LANES)), np.zeros((len(y), LANES))
+            out, along = np.empty((len(y), RATES)), np.zeros((len(y), RATES))
             along[:, : bound.count] = dy[:, place]
             bound.check(bound.slopes(t, y, along, out))
             slopes[:, place] = out[:, : bound.count]
@@ -223,7 +223,7 @@ class Parameters:
     @per_thread
     def _bound(self) -> list[tuple[int, _Bound]]:
         """Number of the first parameter of each block, and the kernels bound to the block."""
-        return [(i * LANES, _Bound(self, block)) for i, block in enumerate(self.blocks)]
+        return [(i * RATES, _Bound(self, block)) for i, block in enumerate(self.blocks)]
 
 
 class _Bound:

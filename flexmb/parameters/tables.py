@@ -15,8 +15,7 @@ import numpy as np
 
 from flexmb.closure.tables import ClosureConstants
 from flexmb.jit.bundle import broaden, bundle
-from flexmb.jit.duals import DUAL
-from flexmb.jit.lanes import LANES
+from flexmb.jit.duals import DUAL, RATES
 from flexmb.jit.wide_arrays import as_duals
 from flexmb.levels.affine_integrals import moving_columns
 from flexmb.tables.arrays import Constants
@@ -33,14 +32,14 @@ _COPIED = {"gravity", "port", "product", "moves"}
 
 @bundle
 class DualConstants(Constants):
-    """The constants of a tree, and their derivatives by LANES parameters."""
+    """The constants of a tree, and their derivatives by RATES parameters."""
 
     numbers = DUAL
 
 
 @bundle
 class DualClosureConstants(ClosureConstants):
-    """The constants of closures, and their derivatives by LANES parameters."""
+    """The constants of closures, and their derivatives by RATES parameters."""
 
     numbers = DUAL
 
@@ -54,7 +53,7 @@ class Tables(NamedTuple):
 
 
 class ParameterBlock(NamedTuple):
-    """Parameters `names` (k,), at most LANES of them, in the lanes of the constants, in this order."""
+    """Parameters `names` (k,), at most RATES of them, in the lanes of the constants, in this order."""
 
     names: tuple[str, ...]
     constants: DualConstants
@@ -180,8 +179,8 @@ def blocks(tables: Tables, is_diagonal: Real, names: Sequence[str], rates: Real)
         body[field] = values
     tree = replace(tables.tree, body=body)
     blocks = [
-        _block(tables._replace(tree=tree), tuple(names[first : first + LANES]), rates[:, first : first + LANES])
-        for first in range(0, len(names), LANES)
+        _block(tables._replace(tree=tree), tuple(names[first : first + RATES]), rates[:, first : first + RATES])
+        for first in range(0, len(names), RATES)
     ]
     broaden([dual.constants for dual in blocks])
     if tables.closures is not None:

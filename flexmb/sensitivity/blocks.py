@@ -1,4 +1,4 @@
-"""The equations of motion of a system in dual numbers: one block of tables for every eight directions."""
+"""The equations of motion of a system in dual numbers: one block of tables for every seven directions."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ import numpy as np
 from flexmb.entry.observed_tangent import OutputsTangent, outputs_tangent
 from flexmb.entry.tangent import TangentWorkspace
 from flexmb.jit.direct import address, addresses
-from flexmb.jit.duals import DualType
-from flexmb.jit.lanes import LANES
+from flexmb.jit.duals import DUAL, RATES
 from flexmb.jit.pointer import REAL, STATUS, VOID
 from flexmb.jit.wide_arrays import as_duals, wide_zeros
 from flexmb.parameters.kernels import chain_rates, parameter_workspace
@@ -50,20 +49,20 @@ class RowResponse(NamedTuple):
 class Blocks:
     """The tables of all blocks of a system, and the addresses of its kernels.
 
-    state, slope (B,nq+nu+1,9): [q, u, work] and its rate, the memory of the workspaces. every (B,m,9): everything
+    state, slope (B,nq+nu+1,8): [q, u, work] and its rate, the memory of the workspaces. every (B,m,8): everything
     observable, the memory of the outputs. Addresses of kernels: motion, manifold, observing_at, closure_loads_at.
     """
 
     def __init__(self, system: System, tables: Sequence[DualTables], directions: int) -> None:
         self.system, self.directions, self.duals = system, directions, list(tables)
         n = system.nq + system.nu + 1
-        self.state, self.slope = (wide_zeros((len(tables), n), width=DualType.width) for _ in range(2))
+        self.state, self.slope = (wide_zeros((len(tables), n), number=DUAL) for _ in range(2))
         self.workspaces = [
             _workspace(system, dual.constants, self.state[b], self.slope[b]) for b, dual in enumerate(tables)
         ]
         out, closures = system.observation.out, 0 if system.closures is None else len(system.scene.constraints)
         free = len(out.every) + len(out.drives)
-        self.every = wide_zeros((len(tables), free + 6 * closures), width=DualType.width)
+        self.every = wide_zeros((len(tables), free + 6 * closures), number=DUAL)
         self.outputs: list[OutputsTangent] = [outputs_tangent(out, each[:free]) for each in self.every]
         self._kind: Any = tree if system.closures is None else chain
         self._loads = list[chain.ClosureLoads]()
@@ -157,19 +156,19 @@ class Blocks:
         return RowResponse(responses[0][0][:, 0], gains, drives, of_rows)
 
     def joined(self, duals: Sequence[Real]) -> Real:
-        """The derivatives (...,P) of one array of duals (...,9) for each block."""
+        """The derivatives (...,P) of one array of duals (...,8) for each block."""
         return np.concatenate([dual[..., 1:] for dual in duals], axis=-1)[..., : self.directions]
 
 
 def dual_parts(table: Any) -> Iterator[tuple[str, str | None, Any]]:
-    """Name, name of the field of its records, and the duals (...,9) of every array of a table in dual numbers."""
+    """Name, name of the field of its records, and the duals (...,8) of every array of a table in dual numbers."""
     for each in fields(table):
         for field, part in array_parts(getattr(table, each.name)):
             yield each.name, field, part
 
 
 def array_parts(array: Any) -> Iterator[tuple[str | None, Any]]:
-    """The duals (...,9) of an array, or of each field of its records, with the name of the field."""
+    """The duals (...,8) of an array, or of each field of its records, with the name of the field."""
     if array.dtype == np.float64:
         yield None, array
     for name in array.dtype.names or ():
@@ -178,8 +177,8 @@ def array_parts(array: Any) -> Iterator[tuple[str | None, Any]]:
 
 
 def set_lanes(duals: Real, rates: Real, b: int) -> None:
-    """Write the derivatives (...,P) of numbers, of which those of block b go into its duals (...,9)."""
-    own = rates[..., LANES * b : LANES * (b + 1)]
+    """Write the derivatives (...,P) of numbers, of which those of block b go into its duals (...,8)."""
+    own = rates[..., RATES * b : RATES * (b + 1)]
     duals[..., 1 : 1 + own.shape[-1]] = own
 
 

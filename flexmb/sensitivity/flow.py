@@ -4,7 +4,7 @@ With y' = f(t, y; p) and the scaled derivatives s_k = scale_k dy/dp_k of P param
 
     z = [y_1, its P derivatives, y_2, its P derivatives ...],    s_k' = df/dy s_k + scale_k df/dp_k.
 
-Eight directions are evaluated at once: y is a dual number whose lanes carry s_k, and so are the constants of the
+Seven directions are evaluated at once: y is a dual number whose lanes carry s_k, and so are the constants of the
 equations of motion, whose lanes carry scale_k dc/dp_k. The kernels of the recursion are compiled once more for them;
 they reach this right-hand side by address, so that it is compiled once. `work` comes last since it is a quadrature,
 which no error test needs (`flexmb.integrate.problem.Accuracy`).
@@ -14,8 +14,8 @@ from __future__ import annotations
 
 from flexmb.jit.bundle import bundle
 from flexmb.jit.direct import nothing_at, status_at
+from flexmb.jit.duals import RATES
 from flexmb.jit.kernel import helper, kernel
-from flexmb.jit.lanes import LANES
 from flexmb.tables.status import OK
 from flexmb.typing import Index, Real
 
@@ -26,9 +26,9 @@ ADDRESSES = 6
 
 @bundle
 class VariationalFlow:
-    """The tables of the variational equations: B blocks of LANES directions each.
+    """The tables of the variational equations: B blocks of RATES directions each.
 
-    The last axis of the arrays of duals holds the value, then the derivatives along LANES directions.
+    The last axis of the arrays of duals holds the value, then the derivatives along RATES directions.
     """
 
     address: Index  # (ADDRESSES,) of kernels
@@ -37,11 +37,11 @@ class VariationalFlow:
     output: Index  # (B,) of its outputs
     load: Index  # (B,) of the loads of its closures; 0 in a tree
     directions: Index  # (1,) P
-    state: Real  # (B,nq+nu+1,9) [q, u, work] as duals; the memory of the blocks' workspaces
-    slope: Real  # (B,nq+nu+1,9) likewise its rate
-    every: Real  # (B,m,9) everything observable, the memory of the outputs
-    law: Real  # (B,states,9) likewise the states of controllers
-    law_rate: Real  # (B,states,9)
+    state: Real  # (B,nq+nu+1,8) [q, u, work] as duals; the memory of the blocks' workspaces
+    slope: Real  # (B,nq+nu+1,8) likewise its rate
+    every: Real  # (B,m,8) everything observable, the memory of the outputs
+    law: Real  # (B,states,8) likewise the states of controllers
+    law_rate: Real  # (B,states,8)
     continuous: Index  # (X,) which of these are integrated
 
 
@@ -86,12 +86,12 @@ def observe_at(times, states, values, rates, s):
             nothing_at(s.address[OBSERVING], (s.block[b], s.output[b]))
             if s.address[CLOSURE_LOADS]:
                 nothing_at(s.address[CLOSURE_LOADS], (s.block[b], s.load[b]))
-            lanes = min(LANES, rates.shape[2] - LANES * b)
+            lanes = min(RATES, rates.shape[2] - RATES * b)
             for j in range(values.shape[1]):
                 number = s.every[b, j]
                 values[i, j] = number[0]
                 for lane in range(lanes):
-                    rates[i, j, LANES * b + lane] = number[1 + lane]
+                    rates[i, j, RATES * b + lane] = number[1 + lane]
     return OK, times.shape[0]
 
 
@@ -123,9 +123,9 @@ def take(z, b, s):
 def _take(row, b, number):
     """A number with the derivatives of block b from those of all."""
     number[0] = row[0]
-    part = row[1 + LANES * b :]
-    if part.shape[0] >= LANES:  # this number of them is known when the kernel is compiled: they are one vector
-        for lane in range(LANES):
+    part = row[1 + RATES * b :]
+    if part.shape[0] >= RATES:  # this number of them is known when the kernel is compiled: they are one vector
+        for lane in range(RATES):
             number[1 + lane] = part[lane]
     else:
         for lane in range(part.shape[0]):
@@ -148,9 +148,9 @@ def _put(number, b, row):
     """The inverse of `_take`."""
     if b == 0:
         row[0] = number[0]
-    part = row[1 + LANES * b :]
-    if part.shape[0] >= LANES:
-        for lane in range(LANES):
+    part = row[1 + RATES * b :]
+    if part.shape[0] >= RATES:
+        for lane in range(RATES):
             part[lane] = number[1 + lane]
     else:
         for lane in range(part.shape[0]):

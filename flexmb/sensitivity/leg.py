@@ -11,7 +11,7 @@ from flexmb.integrate.problem import Accuracy, Clock, problem
 from flexmb.integrate.settings import Settings
 from flexmb.integrate.watch import nothing_watched
 from flexmb.jit.direct import address
-from flexmb.jit.lanes import LANES
+from flexmb.jit.duals import DUAL, RATES
 from flexmb.run.driver import Leg
 from flexmb.run.interruption import interruptible
 from flexmb.run.outputs import ending
@@ -47,7 +47,7 @@ class Variation:
         where = np.zeros(flow.ADDRESSES, np.int64)
         where[flow.MOTION], where[flow.MANIFOLD] = blocks.motion, blocks.manifold
         where[flow.OBSERVING], where[flow.CLOSURE_LOADS] = blocks.observing_at, blocks.closure_loads_at
-        law, law_rate, continuous = np.zeros((B, 0, 9)), np.zeros((B, 0, 9)), np.zeros(0, np.int64)
+        (law, law_rate), continuous = np.zeros((2, B, 0, DUAL.width)), np.zeros(0, np.int64)
         if loops is not None:
             where[flow.CONTROL], where[flow.FOLLOW] = loops.steer, loops.follow
             law, law_rate, continuous = loops.law, loops.law_rate, loops.continuous
@@ -113,7 +113,7 @@ class Variation:
         tables = self.flow
         motion, laws = self._motion, np.arange(len(self._motion) - 1, self._width - 1)
         for b, (state, law) in enumerate(zip(tables.state, tables.law, strict=True)):
-            lanes = slice(LANES * b, min(LANES * (b + 1), at.Y.shape[1]))
+            lanes = slice(RATES * b, min(RATES * (b + 1), at.Y.shape[1]))
             state[:, 0], state[:, 1 : 1 + lanes.stop - lanes.start] = at.y[motion], at.Y[motion, lanes]
             law[tables.continuous, 0] = at.y[laws]
             law[tables.continuous, 1 : 1 + lanes.stop - lanes.start] = at.Y[laws, lanes]

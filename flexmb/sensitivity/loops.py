@@ -24,7 +24,7 @@ from flexmb.control.tables import (
 )
 from flexmb.control.wiring import wired
 from flexmb.jit.direct import address, addresses
-from flexmb.jit.duals import DualType
+from flexmb.jit.duals import DUAL
 from flexmb.jit.pointer import REAL, STATUS, VOID
 from flexmb.jit.wide_arrays import as_duals, wide_zeros
 from flexmb.sensitivity import tree
@@ -41,7 +41,7 @@ _SHARED = "y", "dy", "rates", "markers", "loads", "drives", "function"
 class Loops:
     """The loops of all blocks, in the part of a run that `feedback` has begun.
 
-    law (B,states,9), law_rate: states of controllers and their rates, the memory of the loops.
+    law (B,states,8), law_rate: states of controllers and their rates, the memory of the loops.
     """
 
     def __init__(self, feedback: Feedback, blocks: Blocks, rates: LawRates, before: Loops | None, ends: bool) -> None:
@@ -49,7 +49,7 @@ class Loops:
         part begins, so that controllers which act there have acted in floats only."""
         made, self._feedback, self.blocks = feedback.running, feedback, blocks
         plain, shape = variation.plain_laws(made), (len(blocks), len(made.state))
-        self.law, self.law_rate = (wide_zeros(shape, width=DualType.width) for _ in range(2))
+        self.law, self.law_rate = (wide_zeros(shape, number=DUAL) for _ in range(2))
         self.law[..., 0] = made.state
         self.continuous = np.array(feedback.continuous_states, np.int64)
         self.tables = [

@@ -1,4 +1,4 @@
-"""Derivatives of everything observable along directions in which a motion may change, eight at once.
+"""Derivatives of everything observable along directions in which a motion may change, seven at once.
 
 A motion has coordinates and speeds, accelerations, loads of closures and a time, all of which are independent here. For
 a free motion accelerations and loads follow from the others, and so do their entries in a direction.
@@ -20,7 +20,7 @@ from flexmb.entry.observation import Outputs
 from flexmb.entry.observed_tangent import OutputsTangent, outputs_tangent
 from flexmb.entry.tangent import TangentWorkspace
 from flexmb.jit.direct import Direct, direct
-from flexmb.jit.lanes import LANES
+from flexmb.jit.duals import RATES
 from flexmb.jit.pointer import STATUS
 from flexmb.tables.arrays import Constants
 from flexmb.typing import Real
@@ -74,12 +74,12 @@ class Pushforward:
         self.rows, self._observe, self._check = rows, observe, check
 
     def derivatives(self, at: GivenMotion, directions: Directions, read: Callable[[slice], Real]) -> Real:
-        """(m,k) derivatives of m numbers; `read` takes those of at most eight directions from the tables, at this
+        """(m,k) derivatives of m numbers; `read` takes those of at most seven directions from the tables, at this
         slice of the last axis of arrays of duals, whose first entry is the value. DynamicsError for connectors beyond
         their range."""
         derivatives = []
-        for first in range(0, max(1, len(directions.time)), LANES):
-            some = slice(first, min(first + LANES, len(directions.time)))
+        for first in range(0, max(1, len(directions.time)), RATES):
+            some = slice(first, min(first + RATES, len(directions.time)))
             lanes = slice(1, 1 + some.stop - some.start)
             self._set(at, directions, some, lanes)
             self._check(self._observe(), int(self.w.fault[0]))

@@ -16,7 +16,7 @@ SCENES = {"rigid": lambda: rigid_chain(20), "flexible": lambda: flexible_chain(1
 
 @pytest.mark.parametrize("kind", SCENES)
 def test_jacobian(benchmark, kind):
-    """All columns, eight in an evaluation of duals, against two evaluations of floats for each."""
+    """All columns, seven in an evaluation of duals, against two evaluations of floats for each."""
     system = flexmb.compile(SCENES[kind]())
     state, c, w = system.initial_state, system.constants, system.workspace()
     y = np.concatenate([state.q, state.u, [0.0]])

@@ -1,8 +1,9 @@
-"""Connectors between two points: their loads, and how these change, by dual numbers along 24 directions.
+"""Connectors between two points: their loads, and how these change along 24 directions, by dual numbers along 21.
 
-Each end has twelve: its rotation and displacement in World axes, s0, and s1 of its velocity. The load itself acts like
-one that keeps its direction in World. What it changes by acts on all rows of the paths to both ends, for all sources
-there.
+Each end has twelve: its rotation and displacement in World axes, s0, and s1 of its velocity. A displacement of both
+ends changes no load, so that one of B alone changes it by the opposite of what the same one of A does. The load itself
+acts like one that keeps its direction in World. What it changes by acts on all rows of the paths to both ends, for all
+sources there.
 """
 
 from flexmb.connectors.between import load_between
@@ -10,9 +11,8 @@ from flexmb.jain.derivatives.attached import add_world_load
 from flexmb.jain.derivatives.columns import put_until
 from flexmb.jain.derivatives.ends import fill_end
 from flexmb.jain.derivatives.tables import END_DISPLACED, END_MOTION, END_MOVED, END_SPEED
-from flexmb.jit.duals import rate, seeded
+from flexmb.jit.duals import RATES, rate, seeded
 from flexmb.jit.kernel import helper, sweep
-from flexmb.jit.lanes import LANES
 from flexmb.jit.strips import strip, width
 from flexmb.spatial.rows import strips6
 from flexmb.spatial.spatial_vector import ZERO6, dot6, scale6, shift_force, shift_motion, store6, vec6
@@ -20,13 +20,15 @@ from flexmb.spatial.vector import add, cross, mat3, matmul, times, vec3
 from flexmb.tables.arrays import ON_GROUND
 
 DIRECTIONS = 24
+MOVED, OPPOSITE = 3, 15  # the first of three displacements of A, and of B
+SEEDED = DIRECTIONS - 3
 
 
 @sweep
 def attach_connectors(c, w, d):
     """Loads of all connectors at their ports, and their derivatives to `link`; needs the World poses in w."""
     for i in range(c.connector.shape[0]):
-        for first in range(0, DIRECTIONS, LANES):
+        for first in range(0, SEEDED, RATES):
             _differentiate(c, w, d, i, first)
         for side in range(2):
             if c.end[i, side].body != ON_GROUND:
@@ -36,14 +38,14 @@ def attach_connectors(c, w, d):
 
 @helper
 def _differentiate(c, w, d, i, first):
-    """Eight directions of connector i: forces on the bodies of A and B, about the ends, with the sign of inertia."""
+    """Seven directions of connector i: forces on the bodies of A and B, about the ends, with the sign of inertia."""
     e = d.duals
     store6(e.body[0].velocity, 0, ZERO6)
     store6(e.body[0].accel, 0, ZERO6)
     store6(e.body[0].bias, 0, ZERO6)
     store6(e.body[0].gain, 0, ZERO6)
-    for lane in range(LANES):
-        n = first + lane
+    for lane in range(RATES):
+        n = _direction(first + lane)
         if n < 6:
             e.body[0].velocity[n] = seeded(e.body[0].velocity[n], lane)
         elif n < 12:
@@ -58,11 +60,21 @@ def _differentiate(c, w, d, i, first):
     on_B = vec6(e.connector[i].load, 0)
     store6(e.body[0].hinge_force, 0, shift_force(on_B, vec3(e.connector[i].arm, 0)))
     store6(e.body[0].load, 0, scale6(-1.0, on_B))
-    for lane in range(LANES):
+    for lane in range(RATES):
+        n = _direction(first + lane)
         for row in range(6):
-            d.link[i, row, first + lane] = rate(e.body[0].hinge_force[row], lane)
-            d.link[i, 6 + row, first + lane] = rate(e.body[0].load[row], lane)
-        d.link[i, 12, first + lane] = rate(e.connector[i].power, lane)
+            d.link[i, row, n] = rate(e.body[0].hinge_force[row], lane)
+            d.link[i, 6 + row, n] = rate(e.body[0].load[row], lane)
+        d.link[i, 12, n] = rate(e.connector[i].power, lane)
+        if MOVED <= n < MOVED + 3:
+            for row in range(13):
+                d.link[i, row, n + OPPOSITE - MOVED] = -d.link[i, row, n]
+
+
+@helper
+def _direction(seed):
+    """Of the 21 that are seeded: all but the displacements of B. Blocks of RATES have no rest."""
+    return seed if seed < OPPOSITE else seed + 3
 
 
 @helper

@@ -12,10 +12,9 @@ from flexmb.jain.derivatives.ports import seed_mode
 from flexmb.jain.derivatives.strained import strained_force
 from flexmb.jain.derivatives.strips_of import put_strips, strips_of
 from flexmb.jain.derivatives.tables import MODE_BY_RATE, MODE_BY_TURN, MODE_FORCE, MODE_ROW, MODE_ROWS
-from flexmb.jit.duals import rate, seeded
+from flexmb.jit.duals import RATES, rate, seeded
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, sweep
-from flexmb.jit.lanes import LANES
 from flexmb.jit.strips import put, strip, width
 from flexmb.levels import exact, full
 from flexmb.levels.body import LEVELS, inertia_of_points, is_at_rest
@@ -105,8 +104,8 @@ def _enter(c, w, e, k, V):
 def _along(c, w, d, k, A, start, stop):
     """The same along the directions start .. stop, at level exact of one kind."""
     e, nm = d.duals, c.body[k].modes
-    for first in range(start, stop, LANES):
-        count = min(LANES, stop - first)
+    for first in range(start, stop, RATES):
+        count = min(RATES, stop - first)
         for lane in range(count):
             _seed(e, k, nm, first + lane, lane)
         if has(c, EXACT) and c.body[k].level == EXACT_NUMBER:

@@ -24,10 +24,9 @@ from flexmb.jain.derivatives.tables import (
     TURN,
 )
 from flexmb.jain.ports import mode_motion, move_port
-from flexmb.jit.duals import rate, seeded
+from flexmb.jit.duals import RATES, rate, seeded
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, sweep
-from flexmb.jit.lanes import LANES
 from flexmb.jit.strips import width
 from flexmb.levels.body import is_at_rest
 from flexmb.spatial.cross6 import motion_cross
@@ -176,8 +175,8 @@ def _change(c, w, d, k, i):
     if has(c, SECTIONS) and c.port[i].section >= 0:
         _change_at_section(c, w, d, k, i)
         return
-    for first in range(0, nm + 1, LANES):
-        count = min(LANES, nm + 1 - first)
+    for first in range(0, nm + 1, RATES):
+        count = min(RATES, nm + 1 - first)
         for lane in range(count):
             if first + lane < nm:
                 seed_mode(e, k, nm, first + lane, lane)
@@ -205,8 +204,8 @@ def _change_at_section(c, w, d, k, i):
         for row in range(6):
             d.change[12 + row, n] = 0.0  # A_r is quadratic in the speeds
     for first in range(0, 2 * nm if moves else nm, nm):
-        for start in range(0, nm, LANES):
-            count = min(LANES, nm - start)
+        for start in range(0, nm, RATES):
+            count = min(RATES, nm - start)
             for lane in range(count):
                 seed_mode(e, k, nm, first + start + lane, lane)
             _move_at_section(c, e, k, i, (start, start + count))

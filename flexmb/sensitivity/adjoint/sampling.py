@@ -15,8 +15,8 @@ import numpy as np
 
 from flexmb.control import variation
 from flexmb.control.tables import APPLY
+from flexmb.jit.duals import RATES
 from flexmb.jit.kernel import kernel
-from flexmb.jit.lanes import LANES
 from flexmb.sensitivity.leg import Course, Variation
 from flexmb.sensitivity.loops import Loops
 from flexmb.typing import Index, Real
@@ -100,7 +100,7 @@ class SampledLoop:
     def _set_lanes(self) -> None:
         """Signals and states change along their own directions, and outputs that wait along none."""
         for b, tables in enumerate(self._loops.tables):
-            own = self._along[:, LANES * b : LANES * (b + 1)]
+            own = self._along[:, RATES * b : RATES * (b + 1)]
             tables.signal[:, 1 : 1 + own.shape[1]] = own[: self._signals]
             tables.state[:, 1 : 1 + own.shape[1]] = own[self._signals :]
             tables.held[self._waiting, :, 1:] = 0.0

@@ -3,7 +3,7 @@
 m = F'l for a row l, with F = df/dy, and l . df/dp. The motion of a tree is pulled in O(N) without a matrix, by
 `flexmb.entry.pulled`, which also adds up the derivatives by many constants of the tree. In closed chains, and where the
 scalar depends on the work done, F is the matrix that implicit methods use. What is left are parameters on which other
-constants depend: their lanes are those of the constants of the equations of motion in dual numbers, eight in a block
+constants depend: their lanes are those of the constants of the equations of motion in dual numbers, seven in a block
 (`flexmb.sensitivity.blocks`).
 """
 
@@ -12,9 +12,9 @@ from __future__ import annotations
 from flexmb.entry.pulled import PullWorkspace, pull
 from flexmb.jit.bundle import bundle
 from flexmb.jit.direct import nothing_at, status_at
+from flexmb.jit.duals import RATES
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, kernel
-from flexmb.jit.lanes import LANES
 from flexmb.spatial.scalar import sqrt
 from flexmb.tables.arrays import Constants
 from flexmb.tables.features import PRESCRIBED, QUATERNIONS
@@ -33,9 +33,9 @@ class Lanes:
 
     address: Index  # (2,)
     block: Index  # (B,) addresses of the tables of each block
-    state: Real  # (B,n,9) the state as duals; the memory of the blocks' workspaces
-    slope: Real  # (B,n,9) likewise its rate
-    gradient: Real  # (LANES B,) by the parameters, added up
+    state: Real  # (B,n,8) the state as duals; the memory of the blocks' workspaces
+    slope: Real  # (B,n,8) likewise its rate
+    gradient: Real  # (RATES B,) by the parameters, added up
 
 
 @bundle
@@ -127,7 +127,7 @@ def _hold(y, b, s):
     """The state without derivatives to the duals of a block."""
     for i in range(y.shape[0]):
         s.state[b, i, 0] = y[i]
-        for lane in range(LANES):
+        for lane in range(RATES):
             s.state[b, i, 1 + lane] = 0.0
 
 
@@ -136,5 +136,5 @@ def _add(row, duals, b, s):
     """Add row . derivatives of the duals of a block to the gradient."""
     for i in range(row.shape[0]):
         if row[i] != 0.0:
-            for lane in range(LANES):
-                s.gradient[LANES * b + lane] += row[i] * duals[b, i, 1 + lane]
+            for lane in range(RATES):
+                s.gradient[RATES * b + lane] += row[i] * duals[b, i, 1 + lane]

@@ -14,8 +14,7 @@ from flexmb.jain.derivatives.pull_tables import ARMATURE, DAMPING, REST, STIFFNE
 from flexmb.jain.derivatives.tables import ports_in_use
 from flexmb.jit.bundle import broaden
 from flexmb.jit.direct import addresses
-from flexmb.jit.duals import DualType
-from flexmb.jit.lanes import LANES
+from flexmb.jit.duals import DUAL, RATES
 from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR
 from flexmb.parameters.tables import DualClosureConstants, DualConstants
 from flexmb.sensitivity.adjoint import transposed
@@ -42,7 +41,7 @@ class Transposes:
         c, by_recursion = plant.constants, not of_power and plant.closures is None
         self._chains: list[Any] = []
         self._x = pull_workspace(c, plant.nq, plant.nu) if by_recursion else None
-        acts = [_acting(dual, c, by_recursion, functions) for dual in blocks.duals[: -(-count // LANES)]]
+        acts = [_acting(dual, c, by_recursion, functions) for dual in blocks.duals[: -(-count // RATES)]]
         self._chosen = np.flatnonzero(np.concatenate(acts)[:count])
         self._driven = len(functions)
         lanes = len(self._chosen) + self._driven
@@ -68,11 +67,11 @@ class Transposes:
 
     def _lanes_table(self, plant: System) -> transposed.Lanes:
         if self._lanes is None:
-            nothing = np.zeros((0, plant.nq + plant.nu + 1, DualType.width))
+            nothing = np.zeros((0, plant.nq + plant.nu + 1, DUAL.width))
             return transposed.Lanes(np.zeros(2, np.int64), np.zeros(0, np.int64), nothing, nothing, np.zeros(0))
         return transposed.Lanes(
             np.array([self._lanes.motion, self._lanes.manifold]), np.array(self._lanes.where, np.int64),
-            self._lanes.state, self._lanes.slope, np.zeros(LANES * len(self._lanes)),
+            self._lanes.state, self._lanes.slope, np.zeros(RATES * len(self._lanes)),
         )  # fmt: skip
 
     def choose(self, t: float, y: Real) -> None:
@@ -93,20 +92,20 @@ class Transposes:
         rates[self._chosen] = self._gradient[: len(self._chosen)]
         if self._x is not None:
             p, c = self._x.p, self._blocks.system.constants
-            for b, dual in enumerate(self._blocks.duals[: -(-self._count // LANES)]):
+            for b, dual in enumerate(self._blocks.duals[: -(-self._count // RATES)]):
                 own = by_constants(p, c, dual.constants)
-                count = min(LANES, self._count - LANES * b)
-                chosen = np.isin(np.arange(LANES * b, LANES * b + count), self._chosen)
-                rates[LANES * b : LANES * b + count] += np.where(chosen, 0.0, own[:count])
+                count = min(RATES, self._count - RATES * b)
+                chosen = np.isin(np.arange(RATES * b, RATES * b + count), self._chosen)
+                rates[RATES * b : RATES * b + count] += np.where(chosen, 0.0, own[:count])
         return rates
 
 
 def by_constants(p: Any, c: Constants, duals: DualConstants) -> Real:
-    """(LANES,) by the parameters of a block, from the derivatives by the constants that `Pulled` has."""
+    """(RATES,) by the parameters of a block, from the derivatives by the constants that `Pulled` has."""
     rates = np.einsum("ki,kil->l", p.rigid, duals.body["rigid"][..., 1:])
     rates = rates + np.einsum("ki,kil->l", p.placement[:, :3], duals.body["placement_position"][..., 1:])
     R = c.body["placement_rotation"].reshape(-1, 3, 3)
-    dR = duals.body["placement_rotation"][..., 1:].reshape(len(R), 3, 3, LANES)
+    dR = duals.body["placement_rotation"][..., 1:].reshape(len(R), 3, 3, RATES)
     turn = np.einsum("kijl,kmj->kiml", dR, R)  # of the axes against themselves: a skew matrix
     turn = np.stack([turn[:, 2, 1], turn[:, 0, 2], turn[:, 1, 0]], axis=1)
     rates = rates + np.einsum("ki,kil->l", p.placement[:, 3:], turn)
@@ -116,7 +115,7 @@ def by_constants(p: Any, c: Constants, duals: DualConstants) -> Real:
 
 
 def _acting(duals: DualTables, c: Constants, by_recursion: bool, driven: Sequence[int]) -> Flags:
-    """(LANES,) which parameters of a block the motion depends on; by recursion, but for constants that `Pulled` has.
+    """(RATES,) which parameters of a block the motion depends on; by recursion, but for constants that `Pulled` has.
 
     What controllers drive has directions of its own.
     """
@@ -129,7 +128,7 @@ def _acting(duals: DualTables, c: Constants, by_recursion: bool, driven: Sequenc
         known |= {("body", f"placement_{name}"): on_ports for name in ("position", "rotation")}
         known |= {("speed", "armature"): False, ("port", None): ports_in_use(c)}
         known |= {("speed", name): False for name in ("stiffness", "damping", "rest")} if simple else {}
-    lanes = np.zeros(LANES, bool)
+    lanes = np.zeros(RATES, bool)
     for table in (duals.constants, duals.closures):
         for name, field, part in dual_parts(table) if table is not None else ():
             rates = part[..., 1:] != 0.0
@@ -138,7 +137,7 @@ def _acting(duals: DualTables, c: Constants, by_recursion: bool, driven: Sequenc
                 continue
             if kept is not True:
                 rates = rates[kept]
-            lanes |= np.any(rates.reshape(-1, LANES), axis=0)
+            lanes |= np.any(rates.reshape(-1, RATES), axis=0)
     return lanes
 
 
@@ -147,13 +146,13 @@ def _gathered(blocks: Blocks, chosen: Index, functions: Sequence[int]) -> list[D
     found, sources = list[DualTables](), [dual.constants for dual in blocks.duals]
     closures = [dual.closures for dual in blocks.duals if dual.closures is not None]
     count = len(chosen) + len(functions)
-    for first in range(0, count, LANES):
-        arrays = _lanes_of(sources, chosen[first : first + LANES])
+    for first in range(0, count, RATES):
+        arrays = _lanes_of(sources, chosen[first : first + RATES])
         arrays["function"]["data"][functions, 0, 1:] = 0.0
-        for lane in range(min(LANES, count - first)):
+        for lane in range(min(RATES, count - first)):
             if first + lane >= len(chosen):
                 arrays["function"]["data"][functions[first + lane - len(chosen)], 0, 1 + lane] = 1.0
-        of_closures = _lanes_of(closures, chosen[first : first + LANES]) if closures else None
+        of_closures = _lanes_of(closures, chosen[first : first + RATES]) if closures else None
         own = None if of_closures is None else DualClosureConstants(**of_closures)
         found.append(DualTables(DualConstants(**arrays), own))
     broaden([dual.constants for dual in found])
@@ -171,6 +170,6 @@ def _lanes_of(tables: Sequence[Any], chosen: Index) -> dict[str, Any]:
         for i, (_, part) in enumerate(array_parts(wide)):
             part[..., 1:] = 0.0
             for lane, k in enumerate(chosen):
-                part[..., 1 + lane] = sources[k // LANES][i][..., 1 + k % LANES]
+                part[..., 1 + lane] = sources[k // RATES][i][..., 1 + k % RATES]
         lanes[field.name] = wide
     return lanes

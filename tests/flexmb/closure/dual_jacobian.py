@@ -1,4 +1,4 @@
-"""The Jacobian of `flexmb.closure.jacobian` by another route, dual numbers: eight columns at once, along each direction
+"""The Jacobian of `flexmb.closure.jacobian` by another route, dual numbers: seven columns at once, along each direction
 under loads that keep the rows' accelerations."""
 
 from __future__ import annotations
@@ -10,9 +10,8 @@ from flexmb.closure.tables import ClosureConstants
 from flexmb.closure.tangent import ClosureTangentWorkspace, closure_tangent_workspace, evaluate_held
 from flexmb.entry.tangent import TangentWorkspace, tangent_workspace
 from flexmb.jit.bundle import bundle
-from flexmb.jit.duals import rate, seeded
+from flexmb.jit.duals import RATES, rate, seeded
 from flexmb.jit.kernel import kernel
-from flexmb.jit.lanes import LANES
 from flexmb.tables.arrays import Constants
 from flexmb.tables.status import OK
 from flexmb.typing import Real
@@ -47,8 +46,8 @@ def jacobian(t, y, J, s, x):
         w.state[i] = y[i]
         for j in range(n):
             J[i, j] = 0.0
-    for first in range(0, columns, LANES):
-        count = min(LANES, columns - first)
+    for first in range(0, columns, RATES):
+        count = min(RATES, columns - first)
         for lane in range(count):
             j = w.column[first + lane]
             w.state[j] = seeded(w.state[j], lane)

@@ -1,4 +1,4 @@
-"""The Jacobian of a tree's equations of motion by dual numbers, against which tests hold the recursion: eight columns
+"""The Jacobian of a tree's equations of motion by dual numbers, against which tests hold the recursion: seven columns
 in one evaluation.
 
     w = tangent_workspace(system.constants, system.nq, system.nu)
@@ -6,9 +6,8 @@ in one evaluation.
 """
 
 from flexmb.entry.articulated import slope
-from flexmb.jit.duals import rate, seeded
+from flexmb.jit.duals import RATES, rate, seeded
 from flexmb.jit.kernel import kernel
-from flexmb.jit.lanes import LANES
 from flexmb.tables.status import OK
 
 
@@ -24,8 +23,8 @@ def jacobian(t, y, J, c, w):
         w.state[i] = y[i]
         for j in range(n):
             J[i, j] = 0.0
-    for first in range(0, max(columns, 1), LANES):  # without any column once, for the status
-        count = min(LANES, columns - first)
+    for first in range(0, max(columns, 1), RATES):  # without any column once, for the status
+        count = min(RATES, columns - first)
         for lane in range(count):
             j = w.column[first + lane]
             w.state[j] = seeded(w.state[j], lane)

@@ -20,7 +20,7 @@ from flexmb.jain.derivatives import sweeps
 from flexmb.jain.derivatives.tables import Derivatives
 from flexmb.jit import duals
 from flexmb.jit.counting import Interpreter, _counting
-from flexmb.jit.lanes import LANES
+from flexmb.jit.duals import RATES
 from flexmb.tables.arrays import Constants, Workspace
 from flexmb.tables.features import contained
 from tests.flexmb.entry.terms import Term
@@ -126,13 +126,13 @@ def _as_duals(array: np.ndarray) -> Any:
     if array.dtype.kind == "f":
         found = np.empty(array.shape[:-1], object)
         for place in np.ndindex(found.shape):
-            found[place] = Dual(float(array[place][0]), np.zeros(LANES))
+            found[place] = Dual(float(array[place][0]), np.zeros(RATES))
         return found if found.ndim else found[()]
     return array.copy() if array.ndim else int(array)
 
 
 class Dual:
-    """A number with derivatives (LANES,)."""
+    """A number with derivatives (RATES,)."""
 
     __slots__ = ("rates", "real")
 
@@ -169,7 +169,7 @@ def _rates(x: Any) -> Any:
 
 
 def _seeded(x: Any, lane: int) -> Dual:
-    rates = np.zeros(LANES) + _rates(x)
+    rates = np.zeros(RATES) + _rates(x)
     rates[lane] = 1.0
     return Dual(x.real, rates)
 

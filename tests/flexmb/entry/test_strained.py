@@ -14,7 +14,7 @@ from flexmb.jain.derivatives import flexible
 from flexmb.jain.derivatives.strained import strained_force
 from flexmb.jain.derivatives.tables import duals
 from flexmb.jit.counting import _counting
-from flexmb.jit.lanes import LANES
+from flexmb.jit.duals import RATES
 from flexmb.levels.body import body_inertia
 from flexmb.levels.section_motion import move_sections
 from flexmb.scene import schema as s
@@ -48,7 +48,7 @@ def scene(**of_beam: Any) -> fm.Scene:
     return builder.scene()
 
 
-def moving(of_beam: dict[str, Any], directions: int = LANES) -> Body:
+def moving(of_beam: dict[str, Any], directions: int = RATES) -> Body:
     """Directions of all kinds: components of the angular velocity, displacements, speeds of the modes."""
     system = fm.compile(scene(**of_beam))
     rng, nm, w = np.random.default_rng(3), int(system.constants.body["modes"][0]), system.workspace()
@@ -75,9 +75,9 @@ def moving(of_beam: dict[str, Any], directions: int = LANES) -> Body:
 
 
 def rates(body: Body) -> np.ndarray:
-    """(6+m,LANES) derivatives of the force and of the rows of the modes."""
+    """(6+m,RATES) derivatives of the force and of the rows of the modes."""
     found = *body.e.body[0].hinge_force, *body.e.zf[0][: body.modes]
-    return np.array([interpreted._rates(each) + np.zeros(LANES) for each in found])
+    return np.array([interpreted._rates(each) + np.zeros(RATES) for each in found])
 
 
 def applied(name: str, term: Term | None = None) -> Body:
