@@ -13,7 +13,6 @@ every reader makes the same spline of degree 5.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -26,6 +25,7 @@ from flexmb.dense import DenseSystem
 from flexmb.dense.body_frames import Motions
 from flexmb.dense.closures import rows
 from flexmb.dense.members import ScalarSpeed
+from flexmb.kept import kept
 from flexmb.scene.bodies import BeamBody
 from flexmb.scene.connectors import AngularSpring, LinearSpring, SpringDamper, actuator
 from flexmb.scene.functions import Constant, ControlSignal, Function, Table
@@ -63,7 +63,7 @@ class Manufactured:
     defect: Real
     rounding: Real
 
-    @cached_property
+    @kept
     def dense(self) -> DenseSystem:
         """The scene as written, by the dense route."""
         return DenseSystem(self.scene)
