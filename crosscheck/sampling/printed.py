@@ -35,6 +35,7 @@ from crosscheck.library.case import CaseError, Variant
 from crosscheck.library.find import Case
 from crosscheck.library.patterns import most_specific
 from crosscheck.running.plan import prescribed, sample_times, variant_scene
+from flexmb.output.whole import write_whole
 from flexmb.run.channels import distance, family, signal_range
 from flexmb.scene.check import check_scene
 from flexmb.scene.files import load_scene
@@ -128,7 +129,7 @@ def spreads(case: Case, variant: Variant, listener: Listener = lambda done, of: 
         shutil.copytree(case.folder, place)  # the scene may name files beside it
 
         def scene(moves: Mapping[Place, float]) -> Scene:
-            (place / variant.scene).write_text(moved_text(text, moves), encoding="utf-8")
+            write_whole(place / variant.scene, moved_text(text, moves))
             made = variant_scene(load_scene(place / variant.scene), variant)
             check_scene(made, t_end=variant.duration_s or case.run.duration_s)
             return made

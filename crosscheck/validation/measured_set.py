@@ -311,7 +311,8 @@ def _refuse_unknown_conditions(file: Path, series: Series, known: set[str]) -> N
     for name in (*([series.over] if series.over else []), *series.by):
         if name not in known:
             near = closest(name, known)
-            raise CaseError(f'{file}: series "{series.name}" is drawn by {name}, no column here: {near}')
+            where = f'{file.with_name(FILE)}: series "{series.name}" is drawn by'
+            raise CaseError(f"{where} {name}, which is no column of {file}: {near}")
 
 
 def _number(file: Path, line: int, key: str, text: str) -> float:

@@ -98,12 +98,12 @@ def export(
     **Exit code**: 0 written, 2 the scene or the body is wrong, or is not exported: the message has the remedy.
     """
     with no_traceback():
+        if (inputs and out is not None) or (step is not None and fmu is None):
+            raise ValueError("--input is for --fmu and --c, --step for --fmu")
         if sum(target is not None for target in (out, fmu, c)) != 1:
             raise ValueError("give one of --out FILE (with a BODY), --fmu FILE and --c FOLDER")
         if (body is None) != (out is None):
             raise ValueError("a BODY is written by --out FILE; --fmu and --c write the whole scene, without a BODY")
-        if (inputs and out is not None) or (step is not None and fmu is None):
-            raise ValueError("--input is for --fmu and --c, --step for --fmu")
         if body is not None and out is not None:
             _export_body(scene, body, out, dialect)
         else:

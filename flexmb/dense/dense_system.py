@@ -159,15 +159,16 @@ class DenseSystem:
 
         `frames` are those of the members in unit motions, if they are known.
         """
-        motion, found = self._unit_motions(q), np.zeros((self.nu, len(self.scene.loads)))
+        columns = np.zeros((self.nu, len(self.scene.loads)), q.dtype)  # complex where derivatives are taken by steps
         if not self.scene.loads:
-            return found
+            return columns
+        motion = self._unit_motions(q)
         frames = member_frames(self.tree, motion) if frames is None else frames
         for i, load in enumerate(self.scene.loads):
             site = seat_frame(self.tree, frames, *self.tree.sites[f"load:{load.name}"], motion)
             J, along = _columns(site), _direction(load, site.rotation.value[0, 0])
-            found[:, i] = along @ (J.angular[0] if load.type == "torque" else J.linear[0])
-        return found
+            columns[:, i] = along @ (J.angular[0] if load.type == "torque" else J.linear[0])
+        return columns
 
     def applied(self, q: Real, u: Real, t: float = 0.0) -> Real:
         """tau (nu,) of springs, dampers and motors of hinges, point masses and wheels."""

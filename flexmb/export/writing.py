@@ -95,9 +95,9 @@ def _library(compiler: str, model: ExportedModel, guid: str, step: float) -> byt
     name = model.identifier
     with tempfile.TemporaryDirectory() as place:
         work = Path(place)
-        (work / f"{name}.h").write_text(header(model), encoding="utf-8")
-        (work / "model.c").write_text(core(model) + "\n" + fmi2(model, guid, step), encoding="utf-8")
-        (work / "kernels.o").write_bytes(model.code)
+        write_whole(work / f"{name}.h", header(model))
+        write_whole(work / "model.c", core(model) + "\n" + fmi2(model, guid, step))
+        write_whole(work / "kernels.o", model.code)
         command = [compiler, *FLAGS, "-o", f"{name}.so", "model.c", "kernels.o", "-lm"]
         done = subprocess.run(command, cwd=work, capture_output=True, text=True, errors="replace")
         if done.returncode:

@@ -23,10 +23,12 @@ from flexmb.interchange.imported import ImportedScene, ModelError, listed, namin
 from flexmb.interchange.joint_connectors import SMOOTH, STOPS, JointConnectors
 from flexmb.interchange.urdf_mimic import SCALAR, Mimics
 from flexmb.scene.build import SceneBuilder
+from flexmb.scene.check.inertia import PRINTED
 from flexmb.scene.options import Placement
 from flexmb.scene.problems import Defect, SceneError
 from flexmb.scene.quaternions import about, quaternion_of
 from flexmb.scene.reading import Unreadable, read_text
+from flexmb.scene.rounding import ROUNDING
 from flexmb.scene.tree import GROUND
 from flexmb.typing import Real
 
@@ -187,8 +189,11 @@ class _Robot:
         R, com = self._origin(place, inertial)
         mass = self._number(place, inertial, "mass", "value")
         tensor = self._tensor(place, name, inertial)
-        if self.repair and (changed := _largest((possible := possible_inertia(mass, tensor)) - tensor)):
-            self.repaired.append(f"{name} (by {changed:.3g} of {_largest(tensor):.3g} kg m²)")
+        if self.repair:
+            possible = possible_inertia(mass, tensor)
+            changed, size = _largest(possible - tensor), _largest(tensor)
+            if changed > PRINTED * size + ROUNDING * mass * float(com @ com):  # less is rounding, which needs no note
+                self.repaired.append(f"{name} (by {changed:.3g} of {size:.3g} kg m²)")
             tensor = possible
         turned = R @ tensor @ R.T
         builder.rigid_body(self._body_of(name), mass=mass, com=com, inertia=0.5 * (turned + turned.T))

@@ -50,10 +50,11 @@ UNKNOWN: dict[tuple[str, ...], tuple[str, str]] = {
     ("mutate", "CASE", "-e"): ("natve", NATIVE),
     ("invariance", "CASE", "-e"): ("natve", NATIVE),
     ("stability", "MAP"): ("vibrating_hinje", 'did you mean "vibrating_hinge"?'),
+    ("sensitivity", "CASE"): ("compund", 'did you mean "compound"?'),
     ("validate", "SET"): ("yoyo_dispin", 'did you mean "yoyo_despin"?'),
 }
 """For every way to name an engine, a case, a variant or a map: a word that is none, and what is suggested."""
-WITHOUT_NAMES = {"report", "compare", "list", "engines", "sweep"}
+WITHOUT_NAMES = {"report", "compare", "list", "engines", "sweep", "manufacture"}
 """Commands that take files alone; names in the file of a sweep have a test of their own."""
 
 

@@ -153,9 +153,13 @@ def _text(path: Path) -> str:
 def _measured(path: Path) -> str | None:
     """The mutant beside readings of every series that it names; no number of it may be other than its checks say."""
     beside = path.with_name("points.csv")
-    names = re.findall(r'\[\[series\]\]\s*\nname = "([^"\n]*)"', _text(path))
-    rows = io.StringIO(newline="")
-    csv.writer(rows).writerows([("series", "measured"), *((name, 1.0) for name in names)])
+    text, rows = _text(path), io.StringIO(newline="")
+    names = re.findall(r'\[\[series\]\]\s*\nname = "([^"\n]*)"', text)
+    drawn_by = re.findall(r'"([^"\n]*)"', " ".join(re.findall(r"^(?:over|by) = (.*)", text, re.MULTILINE)))
+    conditions = sorted(set(drawn_by) - {"series", "measured"})
+    among = re.findall(r"^among = \[([\d.]+)", text, re.MULTILINE)  # a reading there identifies, one elsewhere does not
+    at = [(name, 1.0, *([value] * len(conditions))) for name in names for value in ("0", "1", *among)]
+    csv.writer(rows).writerows([("series", "measured", *conditions), *at])
     beside.write_text(rows.getvalue(), encoding="utf-8", newline="")
     try:
         known = read_set(path.parent)
