@@ -203,7 +203,7 @@ def test_one_point_in_twenty_may_be_outside(tmp_path: Path) -> None:
         ),
         (
             {"measured_toml": HEAD + SERIES.format(expect="validated", within=1) + 'over = "y"'},
-            "is drawn by y, no column here",
+            "is drawn by y, which is no column of",
         ),
         (
             {
