@@ -122,7 +122,7 @@ def _open(made: Manufactured) -> set[str]:
     held = np.zeros(dense.nu, dtype=bool)
     held[[x.u for x in dense.tree.scalars if x.prescribed is not None]] = True
     found = open_loads(dense, made.motion.at(0.5 * made.duration_s).q, held)
-    hidden = {f"drive:{name}" for name, is_open in found.drives.items() if is_open}
+    hidden = {f"drive:{name}" for name, is_open in found.drives.items() if np.any(is_open)}
     for name, parts in found.loads.items():
         hidden |= {f"load:{name}.torque"} if np.any(parts[:3]) else set()
         hidden |= {f"load:{name}.force"} if np.any(parts[3:]) else set()

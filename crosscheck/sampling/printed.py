@@ -48,6 +48,7 @@ RERUNS = 4
 RUNS = 1 + 2 * RERUNS  # of each variant
 ULP = 2
 DRAWS = 64  # of signs, until a scene is accepted
+MOST = 1000  # numbers, for each of which the scene is compiled and evaluated twice
 Place = tuple[str | int, ...]
 Listener = Callable[[int, int], None]
 
@@ -122,8 +123,15 @@ def moved_text(text: str, moves: Mapping[Place, float]) -> str:
 
 
 def spreads(case: Case, variant: Variant, listener: Listener = lambda done, of: None) -> VariantSpreads:
-    """Run the variant `RUNS` times. CaseError if native does not run the scene as it is printed."""
+    """Run the variant `RUNS` times. CaseError if native does not run the scene as it is printed, or no moved one, or
+    it has more than `MOST` numbers."""
     text = read_text(case.folder / variant.scene)
+    numbers = printed_numbers(text)
+    if len(numbers) > MOST:
+        raise CaseError(
+            f"{case.name}, {variant.name}: its scene has {len(numbers)} numbers, each of which is tried alone, and "
+            f"{MOST} are the most: take a case with fewer bodies"
+        )
     with TemporaryDirectory() as folder:
         place = Path(folder) / "case"
         shutil.copytree(case.folder, place)  # the scene may name files beside it
@@ -147,8 +155,7 @@ def spreads(case: Case, variant: Variant, listener: Listener = lambda done, of: 
         except (ValueError, NotImplementedError) as error:
             raise CaseError(f"{case.name}, {variant.name}: {ENGINE} does not run it: {error}") from None
         listener(1, RUNS)
-        numbers = printed_numbers(text)
-        movable = [number for number in numbers if stands(number)]
+        moved = [number for number in numbers if stands(number)]
         drawn = np.random.default_rng(0)
 
         def drawn_scene(steps: Sequence[tuple[PrintedNumber, float]]) -> Scene:
@@ -162,12 +169,12 @@ def spreads(case: Case, variant: Variant, listener: Listener = lambda done, of: 
                     if tries == DRAWS:
                         raise
 
-        by_ulp = [(number, ULP * math.ulp(number.value)) for number in movable]
-        by_digit = [(number, number.half_digit) for number in movable]
+        by_ulp = [(number, ULP * math.ulp(number.value)) for number in moved]
+        by_digit = [(number, number.half_digit) for number in moved]
         far: list[dict[str, float]] = []
         failed: list[str] = []
         for kind in (by_ulp, by_digit):
-            apart = dict.fromkeys(nominal, 0.0)
+            apart, before = dict.fromkeys(nominal, 0.0), len(failed)
             for _ in range(RERUNS):
                 try:
                     now = _channels(case, variant, drawn_scene(kind))
@@ -176,6 +183,8 @@ def spreads(case: Case, variant: Variant, listener: Listener = lambda done, of: 
                     continue
                 for name, values in nominal.items():
                     apart[name] = max(apart[name], float(np.max(distance(name, now[name], values))))
+            if len(failed) == before + RERUNS:  # no spread is not a spread of zero
+                raise CaseError(f"{case.name}, {variant.name}: no scene with moved inputs gave a result: {failed[-1]}")
             far.append(apart)
             listener(RUNS if kind is by_digit else 1 + RERUNS, RUNS)
     sizes = Sizes(tuple(nominal), nominal.__getitem__)
@@ -186,8 +195,8 @@ def spreads(case: Case, variant: Variant, listener: Listener = lambda done, of: 
         size = scale or size_of(own, sizes.of(name), 0.0)
         if goal is not None and size > 0.0:
             found[name] = ChannelSpread(far[0][name] / size, far[1][name] / size, E, U, goal)
-    held = tuple(number.name for number in numbers if number not in movable)
-    return VariantSpreads(variant.name, len(movable), held, tuple(failed), found)
+    held = tuple(number.name for number in numbers if number not in moved)
+    return VariantSpreads(variant.name, len(moved), held, tuple(failed), found)
 
 
 def _channels(case: Case, variant: Variant, scene: Scene) -> dict[str, Real]:

@@ -11,6 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from crosscheck import cli
+from crosscheck.library.case_error import CaseError
 from crosscheck.library.find import load_case
 from crosscheck.sampling import printed
 from crosscheck.sampling.printed import RUNS, VariantSpreads, moved_text, printed_numbers, spreads
@@ -76,6 +77,29 @@ def test_runs_are_as_many_as_said(monkeypatch: pytest.MonkeyPatch) -> None:
     case = load_case(CASE)
     spreads(case, case.run.variants[0])
     assert len(runs) == RUNS
+
+
+def test_a_scene_of_too_many_numbers_is_refused_before_it_is_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(printed, "MOST", 3)
+    monkeypatch.setattr(printed, "_channels", None)
+    case = load_case(CASE)
+    with pytest.raises(CaseError, match="numbers, each of which is tried alone, and 3 are the most"):
+        spreads(case, case.run.variants[0])
+
+
+def test_no_result_at_all_is_no_spread_of_zero(monkeypatch: pytest.MonkeyPatch) -> None:
+    runs = []
+
+    def only_the_first(case: object, variant: object, scene: object) -> dict[str, np.ndarray]:
+        runs.append(scene)
+        if len(runs) > 1:
+            raise ValueError("it stopped at t = 1 s")
+        return {"marker:tip.position": np.zeros((3, 3))}
+
+    monkeypatch.setattr(printed, "_channels", only_the_first)
+    case = load_case(CASE)
+    with pytest.raises(CaseError, match="no scene with moved inputs gave a result: it stopped at t = 1 s"):
+        spreads(case, case.run.variants[0])
 
 
 def test_signs_that_are_refused_together_are_drawn_again(monkeypatch: pytest.MonkeyPatch) -> None:
