@@ -29,6 +29,7 @@ from flexmb.scene.problems import SceneWarning
 from flexmb.scene.schema import Scene
 from flexmb.system.held_stretch import unstretchable
 from flexmb.tables import arguments
+from flexmb.tables.brief import brief
 
 BUDGET = 4e10
 """The search for cheaper models ends when its runs have taken this many operations (about 20 s)."""
@@ -97,6 +98,8 @@ class Advice:
     reference: str = ""
     trials: tuple[Trial, ...] = ()
     notes: tuple[str, ...] = ()
+
+    __repr__ = brief
 
     @property
     def accepted(self) -> bool:

@@ -20,6 +20,7 @@ from flexmb.scene.schema import Scene
 from flexmb.system.system import System
 from flexmb.system.watches import warn
 from flexmb.tables import arguments
+from flexmb.tables.brief import brief
 from flexmb.tables.state import State
 from flexmb.typing import Real
 
@@ -40,6 +41,8 @@ class Campbell:
     mac: Real
     names: tuple[str, ...]
     stability: tuple[Stability, ...]
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         """TypeError or ValueError for parts that do not fit together."""

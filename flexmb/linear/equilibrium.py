@@ -12,6 +12,7 @@ from flexmb.linear.newton import Stability, balanced, squares, verdict
 from flexmb.scene.schema import Scene
 from flexmb.system.system import System
 from flexmb.system.watches import of_states, warn
+from flexmb.tables.brief import brief
 from flexmb.tables.state import State
 
 
@@ -22,6 +23,8 @@ class Equilibrium(State):
     where controllers act, of whose loop `linearize` tells."""
 
     stability: Stability | None = field(default=None, init=False)
+
+    __repr__ = brief
 
     def __reduce__(self) -> tuple[Any, ...]:
         """As for a state."""

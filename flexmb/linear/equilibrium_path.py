@@ -31,6 +31,7 @@ from flexmb.scene.schema import Scene
 from flexmb.scene.values import with_values
 from flexmb.system.watches import of_states, warn
 from flexmb.tables import arguments
+from flexmb.tables.brief import brief
 from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Real
 
@@ -59,6 +60,8 @@ class CriticalPoint:
     value: float
     state: Equilibrium
 
+    __repr__ = brief
+
 
 @dataclass(frozen=True, eq=False)
 class EquilibriumPath:
@@ -68,6 +71,8 @@ class EquilibriumPath:
     values: Real
     states: tuple[Equilibrium, ...]
     critical: tuple[CriticalPoint, ...]
+
+    __repr__ = brief
 
     def at(self, value: float) -> tuple[Equilibrium, ...]:
         """All equilibria of the path at one of the values that were asked for, in order; ValueError for others."""

@@ -14,6 +14,7 @@ from scipy.linalg import eig, matrix_balance
 from flexmb.kept import kept
 from flexmb.output.whole import whole_file
 from flexmb.tables import arguments
+from flexmb.tables.brief import brief
 from flexmb.tables.state import State
 from flexmb.typing import Real
 
@@ -116,6 +117,8 @@ class LinearModel:
     motion: Real
     rates: Real
     drift: Real
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         own = {name: np.array(getattr(self, name), float) for name in self._refuse_torn()}

@@ -17,6 +17,7 @@ from flexmb.scene.schema import Revolute, Scene
 from flexmb.system.system import System
 from flexmb.system.watches import warn
 from flexmb.tables import arguments
+from flexmb.tables.brief import brief
 from flexmb.tables.state import State
 
 DEPENDENT = 1e-9  # change of the accelerations with the angle, as part of the size of their derivatives
@@ -32,6 +33,8 @@ class SteadySpin:
     rate: float
     state: State
     equations: Equations
+
+    __repr__ = brief
 
     @property
     def moving(self) -> tuple[Equations, State]:

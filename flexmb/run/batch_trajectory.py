@@ -9,6 +9,7 @@ import numpy as np
 from flexmb.run.outputs import ending
 from flexmb.system.batch import Batch
 from flexmb.tables import arguments
+from flexmb.tables.brief import brief
 from flexmb.tables.status import OK, Status
 from flexmb.typing import Index, Real
 
@@ -33,6 +34,8 @@ class BatchTrajectory:
     evaluations: Index
     accepted_steps: Index
     rejected_steps: Index
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         """TypeError or ValueError for inconsistent arrays. Methods that use them check again, as arrays may change."""

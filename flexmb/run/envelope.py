@@ -11,6 +11,7 @@ import numpy as np
 
 from flexmb.output.whole import write_csv
 from flexmb.run.run_arrays import Kind, RunArrays, labels
+from flexmb.tables.brief import brief
 from flexmb.tables.named import name_parts, parts_of
 from flexmb.typing import Flags, Real
 
@@ -43,6 +44,8 @@ class Extremes:
     greatest: Real
     t_greatest: Real
     error: Real
+
+    __repr__ = brief
 
     @property
     def largest(self) -> Real:

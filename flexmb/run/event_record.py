@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from flexmb.tables.brief import brief
 from flexmb.tables.state import State
 from flexmb.typing import Real
 
@@ -27,3 +28,5 @@ class EventRecord:
     after: State
     closures: dict[str, Real] = field(default_factory=dict)
     early: float = 0.0
+
+    __repr__ = brief

@@ -26,6 +26,7 @@ from flexmb.scene.npz import REAL, TEXT, unpacked
 from flexmb.scene.reading import Unreadable
 from flexmb.scene.schema import Scene
 from flexmb.tables import arguments
+from flexmb.tables.brief import brief
 from flexmb.typing import Real
 
 VERSION = 1
@@ -57,6 +58,8 @@ class Restart:
     memory: Memory
     controllers: LoopMemory | None = None
     events: EventMemory | None = None
+
+    __repr__ = brief
 
     @property
     def since(self) -> float:

@@ -18,6 +18,7 @@ from flexmb.system.algorithm import Algorithm
 from flexmb.system.compile import assembled
 from flexmb.system.system import System
 from flexmb.tables import arguments
+from flexmb.tables.brief import brief
 from flexmb.typing import Real
 
 
@@ -33,6 +34,8 @@ class RunStage:
     values: Mapping[str, Any] = field(default_factory=dict)
     scene: Scene | None = None
     samples: int = 201
+
+    __repr__ = brief
 
 
 def simulate_stages(

@@ -35,6 +35,7 @@ from flexmb.sensitivity.rows import aligned
 from flexmb.sensitivity.sensitivities import of_run
 from flexmb.system.system import System
 from flexmb.tables import arguments
+from flexmb.tables.brief import brief
 from flexmb.tables.state import DynamicsError
 from flexmb.typing import Real
 
@@ -78,6 +79,8 @@ class Fit:
     trajectory: Trajectory
     evaluations: int
     message: str
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         """Values with standard deviations and strongest correlation, and what the residuals are, as a table."""

@@ -18,6 +18,7 @@ import numpy as np
 
 from flexmb.sensitivity.measurements import Measurements, measurements
 from flexmb.tables import arguments
+from flexmb.tables.brief import brief
 
 NODES = 4  # of Gauss's rule in each panel of an integral, which is exact for polynomials of degree 7
 MOST_PANELS = 100_000
@@ -74,6 +75,8 @@ class Misfit:
     data: str | os.PathLike[str] | Mapping[str, Any]
     sigma: float | Mapping[str, float] = 1.0
     measured: Measurements = field(init=False, repr=False, compare=False)
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         """What `fit` raises for such data and sigmas."""

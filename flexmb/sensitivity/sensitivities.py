@@ -23,6 +23,7 @@ from flexmb.sensitivity.channels import Chosen, chosen, refuse_unknown_outputs
 from flexmb.sensitivity.following import Following
 from flexmb.sensitivity.gate import Admitted, admitted
 from flexmb.tables import arguments
+from flexmb.tables.brief import brief
 from flexmb.tables.state import DynamicsError
 from flexmb.typing import Real
 
@@ -36,6 +37,8 @@ class EventSensitivity:
     name: str
     t: float
     derivatives: Real
+
+    __repr__ = brief
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ from flexmb.sensitivity.fit import Fit
 from flexmb.sensitivity.rows import aligned
 from flexmb.sensitivity.sensitivities import Sensitivities, sensitivities
 from flexmb.tables import arguments
+from flexmb.tables.brief import brief
 from flexmb.typing import Real
 
 SYMMETRIC = 1e-9  # relative difference of opposite entries of a correlation, and a negative eigenvalue, from rounding
@@ -43,6 +44,8 @@ class Uncertainties:
     covariance: Real
     contributions: Real
     sensitivities: Sensitivities
+
+    __repr__ = brief
 
     @property
     def shares(self) -> Real:

@@ -16,6 +16,7 @@ from flexmb.entry.observation import parts
 from flexmb.entry.variation import displacement_of
 from flexmb.kept import kept
 from flexmb.system.observables import ENERGIES, PARTS, Observation
+from flexmb.tables.brief import brief
 from flexmb.tables.named import name_parts
 from flexmb.typing import Real
 
@@ -75,6 +76,8 @@ class AccelerationDerivatives:
     by_time: Real
     motion: Real
 
+    __repr__ = brief
+
     @kept
     def by_coordinates(self) -> Real:
         """(nu,nq) by the entries of q, with quaternions normalised: by_displacement = by_coordinates @ motion."""
@@ -91,6 +94,8 @@ class InverseDynamicsDerivatives:
     by_acceleration: Real
     by_time: Real
     motion: Real
+
+    __repr__ = brief
 
     @kept
     def by_coordinates(self) -> Real:
@@ -125,6 +130,8 @@ class EvaluationDerivatives(Generic[By]):
     momentum: By
     connectors: dict[str, By]
     hinge_forces: dict[str, By]
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         name_parts(self, PARTS)

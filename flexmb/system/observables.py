@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from flexmb.entry.observation import Outputs, outputs, parts, places, shapes
 from flexmb.scene.angles import Angles, angles_of
 from flexmb.scene.quaternions import quaternion_of
+from flexmb.tables.brief import brief
 from flexmb.tables.named import parts_of
 from flexmb.tables.state import finite_result
 from flexmb.typing import Flags, Index, Real
@@ -62,6 +63,8 @@ class Evaluation:
     momentum: Real
     connectors: dict[str, Real] = field(default_factory=dict)
     hinge_forces: dict[str, Real] = field(default_factory=dict)
+
+    __repr__ = brief
 
     @property
     def undetermined(self) -> dict[str, NDArray[np.bool_]]:

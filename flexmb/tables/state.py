@@ -12,6 +12,7 @@ import numpy as np
 
 from flexmb.scene.problems import SceneWarning
 from flexmb.tables import arguments
+from flexmb.tables.brief import brief
 from flexmb.tables.soundness import LONGEST, SHORTEST, unsound
 from flexmb.tables.status import Status
 from flexmb.typing import Index, Real
@@ -87,6 +88,8 @@ class State(_KernelArrays):
     u: _StateRow = _StateRow()
     t: float = 0.0
     layout: Layout | None = field(default=None, repr=False)
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         q, u = arguments.array("q", self.kernel_q), arguments.array("u", self.kernel_u)
