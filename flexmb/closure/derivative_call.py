@@ -17,7 +17,7 @@ import numpy as np
 from flexmb.closure.changes import differentiate
 from flexmb.closure.closures import Closures
 from flexmb.closure.factor import solve as solve_rows
-from flexmb.closure.forces import accelerate, choose, free_tree, is_delicate, refine, row_loads
+from flexmb.closure.forces import DELICATE_CHANGES, accelerate, choose, free_tree, is_delicate, refine, row_loads
 from flexmb.closure.jacobian import ChainJacobian, chain_jacobian, factors, hold_rows, put_rows
 from flexmb.closure.sizes import measure_ports
 from flexmb.closure.tables import Closed
@@ -144,7 +144,7 @@ def _respond_to_forces(s, x, count):
             row[n] = 0.0
         row[place] = -1.0
     solve(s.c, x.chain.tree.sweeps, d, nu)
-    delicate = is_delicate(s.cc, s.cw)
+    delicate = is_delicate(s.cc, s.cw, DELICATE_CHANGES)
     for place in range(nu):
         _stop_column(s, x, place, False)
         if delicate:

@@ -22,7 +22,11 @@ from flexmb.motion.coordinates import load_state
 from flexmb.spatial.spatial_vector import add6, vec6
 from flexmb.tables.status import BRANCH_UNKNOWN, CLOSURE_SINGULAR, OK
 
-DELICATE = 2.0**-10  # pivot relative to its ports' response, as of bodies a million times lighter than others
+# Pivots of the rows relative to their ports' response, as of light bodies: a solution by normal equations loses their
+# square. At 2^-10, of bodies a million times lighter than others, loads have ten digits left, and are refined below;
+# derivatives keep twelve, and are refined from 2^-6 on.
+DELICATE = 2.0**-10
+DELICATE_CHANGES = 2.0**-6
 
 
 @kernel
@@ -82,7 +86,7 @@ def _locate(route, t, y, s):
 @helper
 def _refine(route, s):
     """Remove the rounding residual of the row accelerations by one refinement step; requires `accelerate`."""
-    if not is_delicate(s.cc, s.cw):
+    if not is_delicate(s.cc, s.cw, DELICATE):
         return
     evaluate_rows(s.c, s.w, s.cc, s.cw, True)
     _stop_rows(s.cc, s.cw)
@@ -95,12 +99,12 @@ def _refine(route, s):
 
 
 @helper
-def is_delicate(cc, cw):
-    """Whether nearly cancelling loads accelerate light bodies between closures: pivots far below port responses."""
+def is_delicate(cc, cw, share):
+    """Whether nearly cancelling loads accelerate light bodies between closures: a pivot below this share."""
     for g in range(cc.group.shape[0]):
         for a in range(cw.rank[g]):
             r = cw.chosen[cc.group[g].row_start + a]
-            if cc.weight[r] * cw.factor[entry(cc, g, a, a)] < DELICATE * cw.size[r]:
+            if cc.weight[r] * cw.factor[entry(cc, g, a, a)] < share * cw.size[r]:
                 return True
     return False
 

@@ -18,7 +18,7 @@ import numpy as np
 from flexmb.closure.changes import ChainChanges, chain_changes, differentiate, tree_derivatives
 from flexmb.closure.dynamics import slope
 from flexmb.closure.factor import solve as solve_rows
-from flexmb.closure.forces import is_delicate
+from flexmb.closure.forces import DELICATE_CHANGES, is_delicate
 from flexmb.closure.tables import Closed, Recursion
 from flexmb.entry.derivatives import DerivativeWorkspace, store_jacobian
 from flexmb.jain.derivatives.solve import solve
@@ -118,7 +118,7 @@ def hold_rows(d, cc, cw, x):
         for n in range(2 * d.speed.shape[0]):
             x.load[r, n] = 0.0
     _stop_changes(d, cc, cw, x)
-    if is_delicate(cc, cw):
+    if is_delicate(cc, cw, DELICATE_CHANGES):
         _stop_changes(d, cc, cw, x)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from flexmb.closure.couplings import evaluate_coupling, is_coupling
 from flexmb.closure.factor import solve
-from flexmb.closure.forces import is_delicate
+from flexmb.closure.forces import DELICATE_CHANGES, is_delicate
 from flexmb.closure.rows import evaluate_closure, load_on_b
 from flexmb.closure.tables import CLOSURE_STATE, COUPLINGS, ON_GROUND, ROW_STATE, ClosureConstants
 from flexmb.jain.balance import power
@@ -105,7 +105,7 @@ def evaluate_held(s, c, w, cc, cw):
     """
     for r in range(cc.row.shape[0]):
         cw.row[r].load = s.cw.row[r].load
-    status, left = evaluate(c, w, cc, cw), 2 if is_delicate(s.cc, s.cw) else 1
+    status, left = evaluate(c, w, cc, cw), 2 if is_delicate(s.cc, s.cw, DELICATE_CHANGES) else 1
     while status == OK and left > 0:
         for lane in range(RATES):
             _hold_rows(s, cw, lane)

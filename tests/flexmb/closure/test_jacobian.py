@@ -62,7 +62,8 @@ LIGHT = {
     f"random loops {seed}, light {ratio:g}": lambda seed=seed, ratio=ratio: loops.light_loops(seed, ratio)
     for seed in loops.LIGHT for ratio in loops.RATIOS
 }  # fmt: skip
-MOVING |= {name: LIGHT[name] for name in ("random loops 11, light 1e-06", "random loops 44, light 1e-08")}
+MOVING |= {f"random loops {lightest}": LIGHT[f"random loops {lightest}"]
+           for lightest in ("72, light 0.0001", "11, light 1e-06", "44, light 1e-08")}  # fmt: skip
 SCENES = MOVING | LIGHT
 NAMES = [*MOVING, *(pytest.param(name, marks=pytest.mark.slow) for name in LIGHT if name not in MOVING)]
 
@@ -129,7 +130,8 @@ def test_recursion_and_dual_numbers_agree(name, beside, rate, algorithm):
     found = Linearised(system, state(system, beside), rate, algorithm)
     expected = found.by_duals(system)
     size = np.abs(expected).max()
-    assert np.abs(found.J - expected).max() <= 1e-11 * size
+    rounding = 2.0 * 10.0 ** -system.digits_left(system.initial_state)  # of either, where bodies of loops are light
+    assert np.abs(found.J - expected).max() <= max(1e-11, rounding) * size
     planted = found.J.copy()
     planted[system.nq :] *= 1.0 + 1e-9
     assert np.abs(planted - expected).max() > 1e-11 * size
