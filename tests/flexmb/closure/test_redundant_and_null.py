@@ -93,6 +93,7 @@ def test_random_lines_and_planes(seed):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("start", range(FEW, ALL, 25))
+@pytest.mark.filterwarnings("ignore:.*the closures do not allow these values")
 def test_many_random_loops(start):
     for seed in range(start, start + 25):
         check(seed)

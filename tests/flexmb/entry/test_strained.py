@@ -20,6 +20,7 @@ from flexmb.levels.section_motion import move_sections
 from flexmb.scene import schema as s
 from tests.flexmb.entry import interpreted
 from tests.flexmb.entry.terms import Term, terms
+from tests.flexmb.entry.test_terms import unnoticed as unnoticed_in_scenes
 from tests.flexmb.levels.strain_beams import BEAMS, SPACE, beam
 
 LUMPS = [s.TipMass(x_m=1.0, mass_kg=0.2, com_m=(0.03, -0.05, 0.08))]
@@ -139,5 +140,10 @@ def test_some_terms_are_noticed() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings('ignore:scene "connected" is doubtful')
 def test_every_term_is_noticed() -> None:
-    assert unnoticed(list(terms("strained"))) == []
+    """What ports hold is not there for a beam alone: such terms are tried in whole scenes."""
+    alone = set(unnoticed(list(terms("strained"))))
+    left = [term for term in terms("strained") if f"{term.where}: {term.text}" in alone]
+    assert len(left) < 3
+    assert unnoticed_in_scenes(left) == []

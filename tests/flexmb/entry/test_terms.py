@@ -14,6 +14,8 @@ import pytest
 from msgspec.structs import replace
 
 import flexmb
+from flexmb.scene.bodies import Modes
+from flexmb.scene.build import SceneBuilder
 from flexmb.scene.connectors import SpringDamper
 from flexmb.scene.functions import Constant
 from flexmb.scene.schema import Load, Scene
@@ -23,6 +25,7 @@ from tests.flexmb.connectors import connected_scenes
 from tests.flexmb.entry import interpreted
 from tests.flexmb.entry.terms import Term, modules, terms
 from tests.flexmb.entry.test_derivatives import both, bound, mass
+from tests.flexmb.levels.strain_beams import ALLOW, PLANE, SPACE, stations
 
 NOTICED = 1e-6  # relative; a term that is left out is large, and the agreement of both routes is far below
 EVERY = 30  # by default one term in so many; with -m slow all of them
@@ -104,6 +107,27 @@ def twisted(scene: Scene) -> Scene:
     return replace(scene, loads=(*scene.loads, torque))
 
 
+def branched() -> Scene:
+    """Two beams whose sections turn, hinged beside their nodes: what acts there is held by a section within."""
+    scene, rng = SceneBuilder("branched", gravity=(0.3, 0.2, -9.81), allow=ALLOW), np.random.default_rng(5)
+    parent = "ground"
+    for name, modes in (("stem", Modes(count=2, families=SPACE)), ("twig", Modes(count=3, families=PLANE))):
+        scene.beam(name, length=1.0, elements=4, section=stations(1.0, (0.4, -0.5, 0.9)), level="exact", modes=modes,
+                   points="section", nodes={"inside": 0.4})  # fmt: skip
+        scene.revolute(f"hinge of {name}", parent, name, axis=(0.0, 0.6, 0.8), angle=0.4, rate=1.5,
+                       **({} if parent == "ground" else {"parent_node": "inside", "child_node": "inside"}),
+                       parent_position=(0.1, 0.2, -0.3))  # fmt: skip
+        parent = name
+    scene.rigid_body("end", mass=0.7, com=(0.1, 0.2, 0.0), inertia=(0.01, 0.02, 0.03))
+    scene.revolute("elbow", "twig", "end", parent_node="tip", parent_position=(0.0, 0.1, 0.2), axis=(1.0, 0.0, 0.0),
+                   angle=-0.3, rate=2.0)  # fmt: skip
+    counts = flexmb.compile(scene.scene()).constants.body["modes"]
+    for name, count in zip(("stem", "twig"), counts.tolist(), strict=False):
+        coordinates, rates = rng.normal(size=(2, count)) * 0.1
+        scene.modal_state(name, coordinates=coordinates, rates=rates)
+    return scene.scene()
+
+
 @cache
 def scenes() -> list[Compared]:
     """Small scenes that contain everything together."""
@@ -111,7 +135,7 @@ def scenes() -> list[Compared]:
         tethered(flexible_chain(10, 1, "full")), twisted(drawn(trees.ARMED_RIGID, 5, 0)), drawn(trees.FULL, 4, 0),
         drawn(trees.EVERY_LEVEL, 4, 0), tethered(drawn(trees.FULL, 4, 1)), drawn(trees.EVERY_LEVEL, 5, 1),
         drawn(trees.LATER, 4, 1), rigid_chain(10), connected_scenes.everything("full"), drawn(trees.SINGLE, 8, 0),
-        rigid_chain(10),
+        rigid_chain(10), branched(),
     ]  # fmt: skip
     return [compared(scene) for scene in made]
 

@@ -357,9 +357,9 @@ from flexmb.integrate.rk4 import rk4
 from tests.flexmb.integrate.integration_problems import HARMONIC, solve
 from tests.flexmb.jit.test_fingerprint import compiled_beyond
 solve(HARMONIC, [0.0, 1.0], step=1e-2)
-from flexmb.integrate import problem
+from flexmb.integrate import problem, watch
 from tests.flexmb.integrate import integration_problems
-rooms = (problem, integration_problems)
+rooms = (problem, watch, integration_problems)  # those with kernels of their own, which it reaches by address
 mine = [each for room in rooms for each in vars(room).values() if isinstance(each, Dispatcher)]
 helpers = [each for each in gc.get_objects() if isinstance(each, Dispatcher) and each.overloads]
 assert len(helpers) > 5, helpers
