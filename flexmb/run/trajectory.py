@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,7 +21,7 @@ from flexmb.run.peaks import part_of
 from flexmb.run.provenance import Making, error_estimate, has_made, system_at
 from flexmb.run.run_arrays import MarkerPath, RunArrays, Way, refuse_torn
 from flexmb.scene.quaternions import quaternion_of
-from flexmb.system.load_axes import Axes
+from flexmb.system.load_axes import Axes, Redundant
 from flexmb.system.observables import ENERGIES, Observation
 from flexmb.system.section_loads import SectionBalance, SectionLoads
 from flexmb.tables import arguments
@@ -93,18 +93,39 @@ class Trajectory(RunArrays):
             return False
         return ways[0].start == self.t[0] and ways[-1].until >= self.t[-1] and all(way.names == names for way in ways)
 
-    def loads_in(self, axes: Axes = "world", about: tuple[str, str] | None = None) -> dict[str, Real]:
+    def loads_in(
+        self, axes: Axes = "world", about: tuple[str, str] | None = None, *, redundant: Redundant = "open"
+    ) -> dict[str, Real]:
         """`loads` (T,6) in the axes of each hinge's own frame "inboard" or "outboard", and about a node (body, node).
 
-        Components that the motion does not determine in these axes are NaN. See `System.hinge_loads`.
+        redundant: components that the motion does not determine in these axes are "open", which is NaN, or those of
+        "least_norm", one choice of infinitely many. See `System.hinge_loads`.
         """
+        arguments.one_of("redundant", redundant, get_args(Redundant))
         made_by, found = self._making("a hinge's frame"), {name: load.copy() for name, load in self.loads.items()}
+        if redundant == "least_norm":
+            for i, system in enumerate(systems_at(self, made_by)):
+                at = system.hinge_loads(self.state_at(i), axes=axes, about=about, redundant=redundant)
+                for name, load in at.items():
+                    found[name][i] = load
+            return found
         for i, state in enumerate(map(State, self.q, self.u, self.t.tolist())):
             now = {name: load[i] for name, load in self.loads.items()}
             at = system_at(made_by, state.t).referred_loads(state, now, axes, about)
             for name, load in at.items():
                 found[name][i] = load
         return found
+
+    def total_load(self, joints: Sequence[str], on: str, *, about: tuple[str, str] | None = None) -> Real:
+        """Sum (T,6) [torque; force] of the loads that some hinges and closures exert on a body, World axes.
+
+        It is determined where the sum is, although the single loads may be NaN: see `System.total_load` for what sums
+        are, and for ValueError. With controllers, drives are what their outputs were. Raises DynamicsError if a state
+        has no accelerations.
+        """
+        made_by = self._making("a sum of loads")
+        systems = enumerate(systems_at(self, made_by))
+        return np.array([system.total_load(self.state_at(i), joints, on, about=about) for i, system in systems])
 
     def section_loads(self, body: str, x: ArrayLike) -> SectionLoads:
         """Axial force, shear, bending and torsion across sections at x (X,) m of a beam, over time: arrays (T,X,...).

@@ -121,6 +121,38 @@ def test_least_norm_is_one_choice_with_the_same_sum(door: flexmb.System) -> None
     assert np.allclose(apart["lower"] - apart["upper"], total, rtol=1e-12, atol=1e-12)
 
 
+def test_sums_and_splits_over_a_run(door: flexmb.System) -> None:
+    """The sum has no NaN where each pin has one; the split fills these alone, and its parts add up to the sum."""
+    run = flexmb.simulate(door, 0.4, samples=5)
+    open_ones = {name: np.isnan(load) for name, load in run.loads.items()}
+    assert open_ones["lower"].any() and open_ones["upper"].any()
+    total = run.total_load(["lower", "upper"], "door", about=("door", "top"))
+    assert total.shape == (5, 6) and np.all(np.isfinite(total))
+    assert np.allclose(total[:, 5], WEIGHT, rtol=1e-12)  # the centre moves in a plane
+    split = run.loads_in(redundant="least_norm")
+    for name, load in run.loads.items():
+        assert np.all(np.isfinite(split[name])) and np.allclose(split[name][~open_ones[name]], load[~open_ones[name]])
+    there = run.loads_in(about=("door", "top"), redundant="least_norm")
+    assert np.allclose(there["lower"] - there["upper"], total, rtol=1e-10, atol=1e-10)
+    alone = run.total_load(["lower"], "door", about=("door", "top"))
+    assert np.isnan(alone).any()  # what is open stays open
+    with pytest.raises(ValueError, match="redundant"):
+        run.loads_in(redundant="guess")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="no hinge or closure"):
+        run.total_load(["middle"], "door")
+
+
+def test_sums_over_a_run_with_a_controller_are_those_of_its_outputs() -> None:
+    """Of a tree, where the sum is one hinge's load as the run has it."""
+    tree = flexmb.SceneBuilder("held", gravity=(0.0, 0.0, -9.81))
+    tree.rigid_body("arm", mass=1.0, com=(0.3, 0.0, 0.0), inertia=(0.1, 0.1, 0.1))
+    tree.revolute("pivot", "ground", "arm", axis=(0.0, 1.0, 0.0), torque=flexmb.ControlSignal(source="servo"))
+    tree.sense_coordinate("angle", "pivot").pid("servo", "angle", kp=20.0, period=0.05)
+    run = flexmb.simulate(tree.scene(), 0.3, samples=7)
+    assert np.allclose(run.total_load(["pivot"], "arm"), run.loads["pivot"], rtol=1e-9, atol=1e-9)
+    assert np.ptp(run.signals["servo"]) > 1.0
+
+
 def test_a_tree_sums_too() -> None:
     tree = flexmb.SceneBuilder("pair", gravity=(0.0, 0.0, -9.81))
     for name in ("one", "two"):
