@@ -15,7 +15,12 @@ from flexmb.scene.problems import closest
 
 @common.app.command()
 def stability(
-    maps: Annotated[list[str], typer.Argument(help="Names of maps, `all`, or `list` to see which there are.")],
+    maps: Annotated[
+        list[str],
+        typer.Argument(
+            help="Names of maps, `all`, Python files with maps of your own, or `list` to see which there are."
+        ),
+    ],
     out: common.Out = Path("out"),
     depth: Annotated[
         int | None,
@@ -30,20 +35,26 @@ def stability(
     ] = None,
     scheduler: common.SchedulerAddress = LOCAL,
     as_json: common.Json = False,
+    no_user_code: common.NoUserCode = False,
 ) -> None:
     """
     Draw stability maps: where a method or a motion fails, beside the boundary that theory says.
 
+    A file `my_map.py` is executed, here and in every worker, and all maps in its tuple `MAPS` are drawn;
+    `docs/maps.md` has one to begin with.
+
     **Writes** into `--out` the records of each map, `<map>.jsonl`, and into `--pictures` `<map>.svg` and the verdicts,
-    `maps.json`. A run that was stopped resumes where it was.
+    `maps.json`; `crosscheck report` shows those beside its records. A run that was stopped resumes where it was.
 
     **Exit code**: 0 every boundary lies within one of the finest cells of its overlay; 1 one does not, or cells did not
-    run; 2 there is no such map.
+    run; 2 there is no such map, or a file has none.
 
     **Examples**: `crosscheck stability list` · `crosscheck stability vibrating_hinge --depth 5` ·
+    `crosscheck stability my_map.py` ·
     `crosscheck stability all --pictures docs/pictures`
     """
-    from crosscheck.stability.run import PROVIDER, maps_of
+    from crosscheck.library.case_error import CaseError
+    from crosscheck.stability.run import PROVIDER, is_own_file, maps_of
     from crosscheck.stability.verdict_file import VERDICTS
     from crosscheck.terminal.listings import maps_table
     from crosscheck.terminal.many_runs import run_and_draw
@@ -59,10 +70,20 @@ def stability(
     if maps == ["list"]:
         common.console.print(maps_table(known.values()))
         return
-    chosen = list(known) if maps == ["all"] else maps
-    for name in chosen:
-        if name not in known:
-            common.refuse(f'no map "{name}": {closest(name, known)}; `crosscheck stability list` shows them')
+    chosen = dict[str, str]()
+    for word in maps:
+        provider, names = PROVIDER, list(known) if maps == ["all"] else [word]
+        if is_own_file(word):
+            provider = str(Path(word).resolve())
+            try:
+                names = list(maps_of(provider))
+            except CaseError as error:
+                common.refuse(str(error))
+        elif word not in known and maps != ["all"]:
+            common.refuse(f'no map "{word}": {closest(word, known)}; `crosscheck stability list` shows them')
+        for name in names:
+            if chosen.setdefault(name, provider) != provider:
+                common.refuse(f'two maps have the name "{name}": rename one, or give each --out of its own')
     with common.sole_writer(out):
         limits = Limits(jobs, time_limit)
         runs_on = scheduler_at(scheduler)

@@ -16,6 +16,7 @@ from crosscheck.records.machine import environment
 from crosscheck.records.session import standing
 from crosscheck.report.ci import VERDICTS, write_summary, write_verdicts
 from crosscheck.report.junit import write_junit
+from crosscheck.report.maps import read_maps
 from crosscheck.report.mutations import read_scores
 from crosscheck.report.peaks import FILE as ENVELOPES
 from crosscheck.report.peaks import write_envelope
@@ -48,7 +49,7 @@ def write_all(
     write_results(results_of(session, outcome, records), out)
     write_badges(outcome, out)
     write_envelope(session, out)
-    material = Material(session, outcome, read_scores(out))
+    material = Material(session, outcome, read_scores(out), read_maps(out))
     page = write_single(material, out) if single_file else write_site(material, out)
     return outcome, page
 

@@ -21,6 +21,7 @@ from crosscheck.judging.verdict import STATUSES
 from crosscheck.report.case_view import CaseView, case_view
 from crosscheck.report.charts import payload
 from crosscheck.report.html import embedded, source, templates
+from crosscheck.report.maps import Maps
 from crosscheck.report.mutations import Scores
 from crosscheck.report.overview import findings, matrix
 from crosscheck.report.places import INDEX, CasePlace, places
@@ -41,6 +42,7 @@ class Material:
     session: Session
     outcome: SessionOutcome
     scores: Scores
+    maps: Maps
 
 
 def write_site(material: Material, out: Path) -> Path:
@@ -48,8 +50,8 @@ def write_site(material: Material, out: Path) -> Path:
     site = out / FOLDER
     clear_site(site)
     where = places((case.case.case for case in material.session.cases), single=False)
-    index = _page("index.html.j2", material, root="", **_overview(material, where))
-    written = asset_files(SCRIPTS, LIBRARIES)
+    index = _page("index.html.j2", material, root="", inline=False, **_overview(material, where))
+    written = asset_files(SCRIPTS, LIBRARIES) | dict(material.maps.pictures)
     for case in material.session.cases:
         place = where[case.case.case]
         view = _view(case, material, place)
@@ -71,6 +73,7 @@ def write_single(material: Material, out: Path) -> Path:
         material,
         **_overview(material, where),
         root="",
+        inline=True,
         cases=[_view(case, material, where[case.case.case]) for case in cases],
         style=source("style.css"),
         scripts=[*(Markup(_library(name)) for name in LIBRARIES), *map(source, SCRIPTS)],
@@ -125,6 +128,7 @@ def _overview(material: Material, where: dict[str, CasePlace]) -> dict[str, Any]
         "environment": session.environments[-1] if session.environments else None,
         "engines": _engines(session),
         "scores": material.scores,
+        "maps": material.maps,
         "places": where,
     }
 

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Literal
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import RegularGridInterpolator
 
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
+Prediction = Callable[[Real, Real], Real]
 CellStatus = Literal["measured", "failed", "did not finish", "did not run"]
 
 NO_PREDICTION = -3  # in place of the number of a class
@@ -49,6 +52,12 @@ class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         if self.log:
             return np.asarray(self.low * (self.high / self.low) ** fractions)
         return np.asarray(self.low + (self.high - self.low) * fractions)
+
+    def fractions(self, values: Real) -> Real:
+        """Where on the axis, 0..1, parameters are."""
+        if self.log:
+            return np.asarray(np.log(values / self.low) / np.log(self.high / self.low))
+        return np.asarray((values - self.low) / (self.high - self.low))
 
     def edges(self, level: int) -> Real:
         """Bounds (n+1,) of the cells after `level` halvings."""
@@ -98,7 +107,7 @@ class Overlay:
 
     name: str
     source: str
-    predict: Callable[[Real, Real], Real]
+    predict: Prediction
     levels: tuple[float, ...] = (0.0,)
     bound: bool = False
 
@@ -106,6 +115,22 @@ class Overlay:
         """Numbers of the classes expected at x, y; `NO_PREDICTION` where the prediction is NaN."""
         predicted = self.predict(x, y)
         return np.where(np.isnan(predicted), NO_PREDICTION, np.searchsorted(self.levels, predicted, side="right"))
+
+
+def interpolated(x: Axis, y: Axis, predict: Prediction, knots: int = 129) -> Prediction:
+    """A costly prediction, found at `knots` values of each axis and linear between them; beyond the axes too."""
+
+    @cache
+    def table() -> RegularGridInterpolator:
+        places = np.linspace(0.0, 1.0, knots)
+        values = predict(*np.meshgrid(x.values(places), y.values(places), indexing="ij"))
+        return RegularGridInterpolator((places, places), values, bounds_error=False, fill_value=None)
+
+    def found(at_x: Real, at_y: Real) -> Real:
+        fractions = np.stack([x.fractions(np.asarray(at_x)), y.fractions(np.asarray(at_y))], axis=-1)
+        return np.asarray(table()(fractions))
+
+    return found
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ import msgspec
 from crosscheck.records.archive import decoded_lines
 from crosscheck.records.kinds import BrokenLine, Environment
 from crosscheck.records.made_by import made_by
+from crosscheck.records.sources import imported
 from crosscheck.stability.map import Axis, CellStatus, StabilityMap
 from crosscheck.stability.refine import Cell
 
@@ -50,9 +51,16 @@ Written = Environment | MapRecord | CellRecord
 Record = Written | BrokenLine
 
 
-def identity(what: StabilityMap) -> str:
-    """A digest of the map's axes and of everything its cells depend on: sources, libraries, machine (`made_by`)."""
-    code = made_by({what.scene.__module__, what.measure.__module__}, RECORDING)
+def identity(what: StabilityMap, file: Path | None = None) -> str:
+    """A digest of the map's axes and of everything its cells depend on: sources, libraries, machine (`made_by`).
+
+    A map of one's own is in a `file` that is no module: its text counts, and what it imports.
+    """
+    if file is None:
+        code = made_by({what.scene.__module__, what.measure.__module__}, RECORDING)
+    else:
+        own_text = hashlib.sha256(file.read_bytes()).hexdigest()
+        code = f"{own_text} {made_by(imported(file.stem, file), RECORDING)}"
     text = f"{what.name} {what.x} {what.y} {code}"
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 

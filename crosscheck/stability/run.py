@@ -18,6 +18,7 @@ from crosscheck.records.machine import environment
 from crosscheck.running.pool import run_jobs
 from crosscheck.running.scheduler import BY_DEFAULT, TIME_LIMIT_S, Event, Limits, Scheduler, Work
 from crosscheck.stability.boundary import MapVerdict, judge, label
+from crosscheck.stability.catalogue import maps_in
 from crosscheck.stability.map import Measurement, StabilityMap
 from crosscheck.stability.map_records import CellRecord, MapRecord, Written, cells_of, identity, read
 from crosscheck.stability.refine import Cell, CellMesh
@@ -57,7 +58,7 @@ def run_map(
     scheduler: Scheduler = run_jobs,
     listener: Listener = lambda what, done, known: None,
 ) -> Finished:
-    """Run one map of the provider to `depth` halvings (default: its own) and append to the file `records`.
+    """Run one map of the provider (`maps_of`) to `depth` halvings (default: its own) and append to the file `records`.
 
     Cells already recorded by the same sources are kept unless `fresh`. A cell that takes longer than the `limits` allow
     is stopped; for the map it did not run, and the next run asks for it again. `listener` is told how many of the cells
@@ -67,7 +68,7 @@ def run_map(
     mesh = CellMesh(what.x, what.y, what.depth if depth is None else depth)
     if fresh:
         records.unlink(missing_ok=True)
-    mark = identity(what)
+    mark = identity(what, _own_file(provider))
     known = cells_of(read(records), mark) if records.exists() else {}
     used: dict[Cell, CellRecord] = {}
     archive = Archive(records, Written)
@@ -108,10 +109,22 @@ def run_map(
 
 @cache
 def maps_of(provider: str) -> dict[str, StabilityMap]:
-    """Maps by name, from "module:function"."""
+    """Maps by name, from "module:function", or from a file of one's own, whose path ends in ".py" (`maps_in`)."""
+    file = _own_file(provider)
+    if file is not None:
+        return maps_in(file)
     module, _, function = provider.partition(":")
     known: dict[str, StabilityMap] = getattr(import_module(module), function)()
     return known
+
+
+def is_own_file(provider: str) -> bool:
+    """Whether maps come from a file of one's own."""
+    return provider.endswith(".py")
+
+
+def _own_file(provider: str) -> Path | None:
+    return Path(provider) if is_own_file(provider) else None
 
 
 def run_cell(job: CellJob, emit: Callable[[Any], None]) -> None:

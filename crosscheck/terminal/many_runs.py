@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 from rich.console import Console
@@ -25,17 +26,18 @@ from flexmb.output.writing import folder
 
 
 def run_and_draw(
-    console: Console, chosen: Sequence[str], out: Path, pictures: Path, *, depth: int | None, fresh: bool,
+    console: Console, chosen: Mapping[str, str], out: Path, pictures: Path, *, depth: int | None, fresh: bool,
     limits: Limits, scheduler: Scheduler,
 ) -> int:  # fmt: skip
-    """Run maps, draw them, write their verdicts; the exit code: 0 if all agree, else 1."""
+    """Run maps, each from its provider, draw them, write their verdicts; the exit code: 0 if all agree, else 1."""
     verdicts = []
     folder(pictures)
-    take_away_verdicts(chosen, pictures / VERDICTS)
+    take_away_verdicts(list(chosen), pictures / VERDICTS)
     for name in chosen:
         take_away(pictures / f"{name}.svg")
-    for name in chosen:
-        done = _run_map(console, name, out / f"{name}.jsonl", depth, fresh, limits, scheduler)
+    for name, provider in chosen.items():
+        run = partial(run_map, name, out / f"{name}.jsonl", provider=provider)
+        done = _run_map(console, name, partial(run, depth=depth, fresh=fresh, limits=limits, scheduler=scheduler))
         picture = draw(done, pictures / f"{name}.svg")
         verdicts.append(done.verdict)
         write_verdicts([done.verdict], pictures / VERDICTS)  # one by one: another process may write its own
@@ -46,16 +48,14 @@ def run_and_draw(
     return 0 if good == len(verdicts) else 1
 
 
-def _run_map(
-    console: Console, name: str, records: Path, depth: int | None, fresh: bool, limits: Limits, scheduler: Scheduler
-) -> Finished:
+def _run_map(console: Console, name: str, run: Callable[..., Finished]) -> Finished:
     with bars(console, TimeRemainingColumn()) as progress:
         task = progress.add_task(name, total=None)
 
         def hear(what: StabilityMap, done: int, known: int) -> None:
             progress.update(task, completed=done, total=known, description=f"{name}: cells known so far")
 
-        return run_map(name, records, depth=depth, fresh=fresh, limits=limits, scheduler=scheduler, listener=hear)
+        return run(listener=hear)
 
 
 def _verdict_line(done: Finished, picture: Path) -> Text:

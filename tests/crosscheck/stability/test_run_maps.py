@@ -1,6 +1,5 @@
 """Whole maps: verdicts that can fail, failed cells in colours of their own, resuming, and the command."""
 
-import functools
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,7 +18,6 @@ from crosscheck.stability.map_records import CellRecord, cells_of, identity, rea
 from crosscheck.stability.picture import STATUSES, draw
 from crosscheck.stability.run import Finished, run_map
 from crosscheck.stability.verdict_file import read_verdicts
-from crosscheck.terminal import many_runs
 from tests.crosscheck.sessions import here
 from tests.crosscheck.stability import synthetic
 from tests.crosscheck.stability.synthetic import CIRCLE, PROVIDER, shifted
@@ -141,7 +139,6 @@ def test_a_run_that_was_killed_goes_on_where_it_was(tmp_path: Path, monkeypatch:
 
 def test_the_command_writes_pictures_records_and_verdicts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(run, "PROVIDER", PROVIDER)
-    monkeypatch.setattr(many_runs, "run_map", functools.partial(run_map, provider=PROVIDER))
     runner, out = CliRunner(), tmp_path / "out"
     words = ["stability", "circle", "--depth", "2", "--jobs", "1", "--out", str(out)]
     result = runner.invoke(cli.app, words)
