@@ -42,7 +42,7 @@ class MujocoLinear:
         model.opt.integrator, model.opt.timestep = mujoco.mjtIntegrator.mjINT_EULER, 1.0
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP
         self._data = mujoco.MjData(model)
-        moments = (np.linalg.eigvalsh(link.inertia.inertia)[0] for link in tree.links)
+        moments = (np.linalg.eigvalsh(link.inertia.inertia)[0] for link in tree.links if link.freedoms)
         self._raised = sum(bool(moment < LEAST_INERTIA) for moment in moments)
         self._slots = slot_places(scene, tree.slots, model.nv, linear_first=True)
         self._places = self._slots.places

@@ -6,7 +6,8 @@ are in inboard axes (three slides and a ball serve on any parent, MuJoCo's free 
 Two workarounds. (1) A prescribed coordinate has an armature so large that only the applied ARMATURE * acceleration
 moves it; its load is that of the inverse dynamics, which does not contain armatures, plus what moves the scene's own.
 The error of its acceleration is the load / ARMATURE. (2) MuJoCo refuses principal moments of inertia below 1e-15 kg
-m^2: smaller ones (point masses, rods) are raised to `LEAST_INERTIA`.
+m^2 of bodies that have joints: smaller ones (point masses, rods) are raised to `LEAST_INERTIA`. Welded bodies have theirs:
+raised ones would add up to 1e-10 of the inertia of a small robot's limb.
 """
 
 from __future__ import annotations
@@ -128,7 +129,7 @@ def build_tree(
         body.mass = link.inertia.mass
         body.ipos = link.inertia.com
         if not is_bare_frame(link):
-            principal, axes = _principal(link.inertia.inertia)
+            principal, axes = _principal(link.inertia.inertia, LEAST_INERTIA if link.freedoms else 0.0)
             body.inertia = principal
             body.iquat = quaternion_of(axes)
         for k, freedom in enumerate(link.freedoms):
@@ -226,11 +227,11 @@ def _joints_of(freedom: Freedom) -> int:
             assert_never(freedom)
 
 
-def _principal(inertia: Real) -> tuple[Real, Real]:
-    """Principal moments (3,), none below `LEAST_INERTIA`, and right-handed axes (3,3) as columns."""
+def _principal(inertia: Real, least: float) -> tuple[Real, Real]:
+    """Principal moments (3,), none below `least`, and right-handed axes (3,3) as columns."""
     moments, axes = np.linalg.eigh(inertia)
     axes[:, 2] *= np.sign(np.linalg.det(axes))
-    moments = np.maximum(moments, LEAST_INERTIA)
+    moments = np.maximum(moments, least)
     # A disc's moments miss the triangle inequality by round-off, and the compiler refuses it.
     moments[2] = min(moments[2], moments[0] + moments[1])
     return moments, axes

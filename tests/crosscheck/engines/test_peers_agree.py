@@ -98,6 +98,22 @@ def test_frames_without_mass_that_are_welded_to_others(name):
     _compare(builder.force("push", "tool", direction=(0, 1, 0), function=Constant(value=3.0)).scene(), name)
 
 
+@pytest.mark.parametrize("name", ["mujoco"])
+def test_points_of_mass_that_are_welded_to_light_links(name, monkeypatch):
+    """The feet of a small quadruped. MuJoCo's were given an inertia, 1e-8 of this link's, and codes *differ* by it."""
+    builder = SceneBuilder("leg", gravity=(0.0, 0.0, -9.81))
+    builder.rigid_body("shank", mass=0.02, com=(0.0, 0.0, -0.005), inertia=(1e-7, 1.1e-7, 1e-7))
+    builder.rigid_body("foot", mass=0.003, inertia=(0.0, 0.0, 0.0))
+    builder.revolute("knee", "ground", "shank", axis=(0, 1, 0), angle=0.5, rate=1.0)
+    scene = builder.weld("tip", "shank", "foot", parent_position=(0, 0, -0.01)).marker("foot", "foot").scene()
+    _compare(scene, name)
+    tree = pytest.importorskip("crosscheck.engines.mujoco.tree")
+    raised = tree._principal
+    monkeypatch.setattr(tree, "_principal", lambda inertia, least: raised(inertia, tree.LEAST_INERTIA))
+    with pytest.raises(AssertionError, match="acceleration"):
+        _compare(scene, name)
+
+
 def _notices_armatures(scene: Scene, armed: Scene, name: str) -> None:
     """Without armatures the motion is another."""
     with pytest.raises(AssertionError, match="acceleration"):
