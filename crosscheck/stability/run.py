@@ -18,9 +18,9 @@ from crosscheck.records.machine import environment
 from crosscheck.running.pool import run_jobs
 from crosscheck.running.scheduler import BY_DEFAULT, TIME_LIMIT_S, Event, Limits, Scheduler, Work
 from crosscheck.stability.boundary import MapVerdict, judge, label
-from crosscheck.stability.catalogue import maps_in
 from crosscheck.stability.map import Measurement, StabilityMap
 from crosscheck.stability.map_records import CellRecord, MapRecord, Written, cells_of, identity, read
+from crosscheck.stability.own_maps import maps_in
 from crosscheck.stability.refine import Cell, CellMesh
 
 PROVIDER = "crosscheck.stability.catalogue:stability_maps"

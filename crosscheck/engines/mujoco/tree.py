@@ -6,8 +6,8 @@ are in inboard axes (three slides and a ball serve on any parent, MuJoCo's free 
 Two workarounds. (1) A prescribed coordinate has an armature so large that only the applied ARMATURE * acceleration
 moves it; its load is that of the inverse dynamics, which does not contain armatures, plus what moves the scene's own.
 The error of its acceleration is the load / ARMATURE. (2) MuJoCo refuses principal moments of inertia below 1e-15 kg
-m^2 of bodies that have joints: smaller ones (point masses, rods) are raised to `LEAST_INERTIA`. Welded bodies have theirs:
-raised ones would add up to 1e-10 of the inertia of a small robot's limb.
+m^2 of bodies that have joints: smaller ones (point masses, rods) are raised to `LEAST_INERTIA`. Welded bodies have
+theirs: raised ones would add 1e-10 and more to the inertia of a small robot's limb.
 """
 
 from __future__ import annotations

@@ -80,30 +80,36 @@ def order_law(
     return predict
 
 
-def order_map(
-    name: str, title: str, quantity: str, shows: str, source: str, *, scene: Scene, error: Error,
-    steppings: tuple[Stepping, ...], steps: tuple[float, float, float], levels: tuple[float, ...],
-    kinds: tuple[Kind, ...],
-) -> StabilityMap:  # fmt: skip
-    """A map of errors (log10) of methods against steps from the first to the second of `steps` (s); the overlay is
-    through the errors at the third."""
-    low, high, anchor = steps
-    return StabilityMap(
-        name=name,
-        title=title,
-        quantity=quantity,
-        scene=lambda step, number: scene,
-        measure=lambda scene, step, number: Measurement(error(steppings[round(number)], scene, step)),
-        x=Axis("step", "s", low, high, 5, log=True),
-        y=Axis.of("method", *(each.label for each in steppings)),
-        thresholds=levels,
-        kinds=kinds,
-        overlay=Overlay(
-            "the order of each method", source, order_law(steppings, error, scene, anchor), levels=levels
-        ),
-        shows=shows,
-        depth=1,
-    )  # fmt: skip
+class OrderMap(NamedTuple):
+    """Errors (log10) of methods against steps (s) from `low` to `high`; the overlay is through those at `anchor`."""
+
+    scene: Scene
+    error: Error
+    steppings: tuple[Stepping, ...]
+    low: float
+    high: float
+    anchor: float
+    levels: tuple[float, ...]
+    kinds: tuple[Kind, ...]
+    source: str
+
+    def named(self, name: str, title: str, quantity: str, shows: str) -> StabilityMap:
+        """The map with its words."""
+        law = order_law(self.steppings, self.error, self.scene, self.anchor)
+        return StabilityMap(
+            name=name,
+            title=title,
+            quantity=quantity,
+            scene=lambda step, number: self.scene,
+            measure=lambda scene, step, number: Measurement(self.error(self.steppings[round(number)], scene, step)),
+            x=Axis("step", "s", self.low, self.high, 5, log=True),
+            y=Axis.of("method", *(each.label for each in self.steppings)),
+            thresholds=self.levels,
+            kinds=self.kinds,
+            overlay=Overlay("the order of each method", self.source, law, levels=self.levels),
+            shows=shows,
+            depth=1,
+        )
 
 
 # ---- A tumbling body
@@ -177,28 +183,33 @@ def load_error(method: Stepping, scene: Scene, step: float) -> float:
 
 
 ORDERS = "orders: Hairer, Lubich, Wanner 2006; Chung, Hulbert 1993; MuJoCo and Exudyn documentation"
+TUMBLES = OrderMap(
+    tumbling(), lambda method, scene, step: kept(method, scene, step)[0], RIVALS, 2e-3, 1e-1, 1e-2,
+    (-10.0, -7.0, -4.0, -2.0),
+    digit_kinds("below 1e-10", "1e-10 to 1e-7", "1e-7 to 1e-4", "1e-4 to 1e-2", "above 1e-2"), ORDERS,
+)  # fmt: skip
+SWINGS = OrderMap(
+    swinging(), load_error, INDEX, 1e-3, 5e-2, 1e-2, (-5.0, -4.0, -3.0, -2.0),
+    digit_kinds("below 1e-5", "1e-5 to 1e-4", "1e-4 to 1e-3", "1e-3 to 1e-2", "above 1e-2"),
+    "second order of multipliers too: Arnold, Brüls 2007; closed form: Jacobi's elliptic functions",
+)  # fmt: skip
 MAPS = (
-    order_map(
-        "momentum_drift", "A tumbling body: momentum lost by each method", "log10 of the change of angular momentum",
-        "Nothing turns a free body; what its angular momentum changes by is the method's error.", ORDERS,
-        scene=tumbling(), error=lambda method, scene, step: kept(method, scene, step)[0], steppings=RIVALS,
-        steps=(2e-3, 1e-1, 1e-2), levels=(-10.0, -7.0, -4.0, -2.0),
-        kinds=digit_kinds("below 1e-10", "1e-10 to 1e-7", "1e-7 to 1e-4", "1e-4 to 1e-2", "above 1e-2"),
+    TUMBLES.named(
+        "momentum_drift",
+        "A tumbling body: momentum lost by each method",
+        "log10 of the change of angular momentum",
+        "Nothing turns a free body; what its angular momentum changes by is the method's error.",
     ),
-    order_map(
-        "energy_drift", "A tumbling body: energy lost or won by each method", "log10 of the change of energy",
+    TUMBLES._replace(error=lambda method, scene, step: kept(method, scene, step)[1], anchor=2e-2).named(
+        "energy_drift",
+        "A tumbling body: energy lost or won by each method",
+        "log10 of the change of energy",
         "Methods of fourth order keep the energy of a tumbling body, those of first order lose or win all of it.",
-        ORDERS, scene=tumbling(), error=lambda method, scene, step: kept(method, scene, step)[1], steppings=RIVALS,
-        steps=(2e-3, 1e-1, 2e-2), levels=(-10.0, -7.0, -4.0, -2.0),
-        kinds=digit_kinds("below 1e-10", "1e-10 to 1e-7", "1e-7 to 1e-4", "1e-4 to 1e-2", "above 1e-2"),
     ),
-    order_map(
-        "index_load", "The load of a pin: without constraints, at index 2 and at index 3",
+    SWINGS.named(
+        "index_load",
+        "The load of a pin: without constraints, at index 2 and at index 3",
         "log10 of the error of the force over the weight",
         "Loads of index 3 keep the second order of the method as those of index 2 do, in a smooth motion.",
-        "second order of multipliers too: Arnold, Brüls 2007; closed form: Jacobi's elliptic functions",
-        scene=swinging(), error=load_error, steppings=INDEX, steps=(1e-3, 5e-2, 1e-2),
-        levels=(-5.0, -4.0, -3.0, -2.0),
-        kinds=digit_kinds("below 1e-5", "1e-5 to 1e-4", "1e-4 to 1e-3", "1e-3 to 1e-2", "above 1e-2"),
     ),
-)  # fmt: skip
+)

@@ -8,8 +8,8 @@ from typer.testing import CliRunner
 from crosscheck import cli
 from crosscheck.report import write_all
 from crosscheck.report.maps import Maps, read_maps
-from crosscheck.stability.catalogue import maps_in
 from crosscheck.stability.map_records import CellRecord, identity, read
+from crosscheck.stability.own_maps import maps_in
 from crosscheck.stability.picture import draw
 from crosscheck.stability.run import run_map
 from crosscheck.stability.verdict_file import read_verdicts, write_verdicts
