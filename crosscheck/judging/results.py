@@ -11,7 +11,16 @@ import numpy as np
 
 from crosscheck.engines.openness import NOTHING_OPEN, Openness
 from crosscheck.judging.sizes import Sizes
-from crosscheck.judging.uncertainty import RUNGS, RungSignal, Uncertainty, at_rest, estimate, spatial, unknown
+from crosscheck.judging.uncertainty import (
+    RUNGS,
+    RungSignal,
+    Uncertainty,
+    at_rest,
+    estimate,
+    spatial,
+    ulp_of_arithmetic,
+    unknown,
+)
 from crosscheck.judging.verdict import Ending, Signal
 from crosscheck.library.channels import is_judged, known_to
 from crosscheck.records.drawing import FILM
@@ -118,12 +127,15 @@ class Result:
         return bool(seen) and all(signal_range(name, self.values(name)) <= AT_REST for name in seen)
 
     def _with_own(self, channel: str, of_run: Uncertainty) -> Uncertainty:
-        """U with what the engine says of how well it knows a derivative or a frequency of a state."""
-        own = self._own(channel)
-        if own is None:
-            return of_run
-        envelope = of_run.envelope + np.maximum.accumulate(own)
-        how = f"{of_run.how}; {self.own_account(channel):.1e} by the engine's own account"
+        """U with what the engine says of how well it knows a derivative or a frequency of a state, and with what moved
+        inputs do to its run."""
+        own, moved = self._own(channel), self.finest.rounding.get(channel, 0.0) * ulp_of_arithmetic(self._sizes.joints)
+        envelope, how = of_run.envelope, of_run.how
+        if own is not None:
+            envelope = envelope + np.maximum.accumulate(own)
+            how = f"{how}; {self.own_account(channel):.1e} by the engine's own account"
+        if moved:
+            envelope, how = envelope + moved, f"{how}; {moved:.1e} by rounding, as runs with moved inputs show"
         return Uncertainty(envelope, float(envelope[-1]), how, of_run.order)
 
     def own_account(self, channel: str) -> float:

@@ -44,6 +44,14 @@ normal (Henrici 1962) and is bounded by
 
 times the size: few values in 1e9 are further than six standard deviations off.
 
+What the condition of a scene makes of rounding is not in it. Where a mass matrix is badly conditioned, or a motion is
+chaotic, the same roundings count for more: a backward-stable algorithm gives the exact result of a scene whose numbers
+are off by as many units in the last place as its arithmetic rounds (Higham 2002, 1.5). Variants may ask for runs with
+moved inputs (`crosscheck.running.moved`). Their distance d from the run of the scene, for a unit in the last place of
+all numbers, adds
+
+    LIKELY sqrt(ROUNDINGS n / 12) d.
+
 **Rest.** Efforts that made as many evaluations and gave the same result in every channel were ignored by the engine,
 and tell nothing. Derivatives of a state that rests are the exception: where nothing moves, every effort has that state.
 
@@ -164,8 +172,13 @@ def _enveloped(factor: float, gap: Real, floor: float, how: str, order: float | 
 
 def roundoff_floor(size: float, evaluations: int, joints: int = 0) -> float:
     """eps sqrt(N) times the size of the signals, and the rounding of arithmetic that passes so many joints."""
-    in_steps, in_channel = np.sqrt(float(min(evaluations, MOST_COUNTED))), LIKELY * np.sqrt(ROUNDINGS * joints / 12.0)
-    return float(np.finfo(np.float64).eps * (in_steps + in_channel) * size)
+    in_steps = np.sqrt(float(min(evaluations, MOST_COUNTED)))
+    return float(np.finfo(np.float64).eps * (in_steps + ulp_of_arithmetic(joints)) * size)
+
+
+def ulp_of_arithmetic(joints: int) -> float:
+    """By how many units in the last place the rounding of arithmetic that passes so many joints is likely bounded."""
+    return float(LIKELY * np.sqrt(ROUNDINGS * joints / 12.0))
 
 
 def spatial(channel: str, coarse: Real, fine: Real, ratio: float, order: float) -> Real:

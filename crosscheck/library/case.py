@@ -103,7 +103,7 @@ All keys, with defaults in brackets; the structs below explain them:
   ``efforts`` [the engine's own], each with ``engine``, ``kind`` ("tolerance" or "step"), ``method`` and falling
   ``values``; ``duration_s`` and ``samples`` [the case's]; ``start`` [the scene's], "equilibrium" near it; ``linear``
   [none], what its engines are asked of the linearised motion at every sample: "derivatives", "frequencies" or both;
-  ``note`` [none], shown in the report;
+  ``rounding`` [false], whether U has what moved inputs do to each engine's result; ``note`` [none], for the report;
 - ``comparison``: ``name``; ``variant`` with ``engines`` [all of the variant's], or ``a`` and ``b``, each with a
   ``variant`` and an ``engine``; ``goals``; ``scales`` [the ranges] (SI); ``expect`` ["agree"]; ``band``, ``diverged_s``
   or ``because``, as ``expect`` needs; ``reason``;
@@ -207,7 +207,8 @@ class Variant(_CasePart, frozen=True, kw_only=True):
     body. `engines` are compared engine by engine; those in `also` run the variant too, for its charts and for what
     names them. `duration_s` and `samples` replace the case's. `start` = "equilibrium" replaces the initial state by the
     equilibrium that flexmb finds from it. `linear` asks for derivatives of accelerations and for
-    eigenfrequencies at every sample. `note` is shown in the report.
+    eigenfrequencies at every sample. `rounding` = true adds to U what rounding does to each engine's result, by two
+    more runs with numbers that are moved by 2 units in the last place. `note` is shown in the report.
     """
 
     name: str
@@ -226,7 +227,13 @@ class Variant(_CasePart, frozen=True, kw_only=True):
     samples: int | None = None
     start: Start | msgspec.UnsetType = msgspec.UNSET  # neither is among the keys of records without it
     linear: tuple[LinearPart, ...] | msgspec.UnsetType = msgspec.UNSET
+    rounding: bool | msgspec.UnsetType = msgspec.UNSET
     note: str = ""
+
+    @property
+    def moves_inputs(self) -> bool:
+        """Whether U has what rounding of the scene's numbers does."""
+        return self.rounding is True
 
     @property
     def asks(self) -> tuple[LinearPart, ...]:

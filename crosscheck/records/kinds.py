@@ -157,7 +157,8 @@ class RunRecord(_OneRecord, frozen=True, kw_only=True, tag="run"):
     `undetermined` names components that the motion does not determine, as the engine says: they are stored as NaN, and
     channels that have no others are not stored (of earlier versions, whole channels). `events`
     are names and times (s) of what happened in the run. `envelope`, of the role "envelope", are extremes by channel, as
-    rows of `crosscheck.engines.extremes`.
+    rows of `crosscheck.engines.extremes`. `rounding`, of variants that ask for it, is how far (SI) each
+    channel is moved by a unit in the last place of all inputs.
     """
 
     case: str
@@ -187,6 +188,7 @@ class RunRecord(_OneRecord, frozen=True, kw_only=True, tag="run"):
     undetermined: tuple[str, ...] = ()
     events: tuple[tuple[str, float], ...] = ()
     envelope: dict[str, Packed] = {}
+    rounding: dict[str, float] = {}
 
     @property
     def key(self) -> tuple[str, ...]:

@@ -25,6 +25,7 @@ from crosscheck.records.sources import owner, sources
 RECORDING = (
     "crosscheck.running.execute",
     "crosscheck.running.rung",
+    "crosscheck.running.moved",
     "crosscheck.engines.checked",
     "crosscheck.engines.answers",
     "crosscheck.engines.contract",

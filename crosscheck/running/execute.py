@@ -11,12 +11,13 @@ import numpy as np
 
 from crosscheck.engines.answers import clean, describe
 from crosscheck.engines.checked import CheckedEngine
-from crosscheck.engines.contract import Engine, EngineMissing
+from crosscheck.engines.contract import Effort, Engine, EngineMissing
 from crosscheck.engines.registry import NoSuchEngine, find_engine
 from crosscheck.records.kinds import Confirmed, RunRecord
 from crosscheck.records.made_by import made_by
 from crosscheck.records.packing import pack
 from crosscheck.running.job import Done, Job, extended
+from crosscheck.running.moved import rounding
 from crosscheck.running.rung import Solved, solve_rung
 from flexmb.scene.schema import Scene
 
@@ -63,6 +64,7 @@ def _solve_efforts(found: Engine, job: Job, scene: Scene, emit: Callable[[Solved
     kept = job.kept if rungs > FULLY_STORED or job.lean else ()
     code = made_by({type(found).__module__, job.maker} - {""})
     longer = f" {job.extra} {job.finer}" if job.extra or job.finer else ""  # tells it from the ladder without these
+    longer += " with moved inputs" if job.rounding else ""
     key = hashlib.sha256(f"{code} {version} {kept}{longer}".encode()).hexdigest()[:16]
     chosen = [(rung, effort) for rung, effort in enumerate(ladder) if not job.finest_only or rung == rungs - 1]
     waiting = [(rung, effort) for rung, effort in chosen if Done(effort.label, key, rung, rungs) not in job.done]
@@ -79,7 +81,21 @@ def _solve_efforts(found: Engine, job: Job, scene: Scene, emit: Callable[[Solved
     for rung, effort in waiting:
         emit(effort.label)
         stores_all = rung >= rungs - FULLY_STORED and not job.lean
-        emit(solve_rung(model, job, effort, msgspec.structs.replace(blank, rung=rung), stores_all))
+        solved = solve_rung(model, job, effort, msgspec.structs.replace(blank, rung=rung), stores_all)
+        if job.rounding and rung == rungs - 1 and solved.record.status == "finished":
+            emit("moved inputs")
+            solved = _with_rounding(engine, job, scene, effort, solved)
+        emit(solved)
+
+
+def _with_rounding(engine: Engine, job: Job, scene: Scene, effort: Effort, solved: Solved) -> Solved:
+    """The finished run with what rounding does to it; if that cannot be found a failed one: U would be too small."""
+    try:
+        found = rounding(engine, job, scene, effort, solved.channels)
+    except Exception as error:
+        failed = msgspec.structs.replace(solved.record, status="failed", message=describe(error))
+        return Solved(failed)
+    return solved._replace(record=msgspec.structs.replace(solved.record, rounding=found))
 
 
 def _checked(engine: Engine, job: Job) -> Engine:

@@ -59,7 +59,7 @@ class Job:
     uncertainty store only the channels `kept`. `done` are the runs already recorded for this very scene. A job with an
     `error` cannot be run. It is stopped after `time_limit_s`; `expected_s` is what it took the last time, None if
     unknown. A `lean` job runs each effort once, even a short one, and stores only `kept`. `linear` is what it asks of
-    the linearised motion.
+    the linearised motion. With `rounding`, the finest effort is run with moved inputs too (`crosscheck.running.moved`).
     """
 
     case: str
@@ -82,6 +82,7 @@ class Job:
     expected_s: float | None = None
     lean: bool = False
     linear: tuple[LinearPart, ...] = ()
+    rounding: bool = False
 
     @property
     def work(self) -> tuple[str, str, str, str]:

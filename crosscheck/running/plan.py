@@ -212,6 +212,7 @@ def _job(
         efforts=prescribed(variant, engine), extra=case.claims.efforts_of(engine),
         finer=run.finer if joining(case.run, [engine]) else 0, finest_only=role != MAIN,
         kept=tuple(chart.observable for chart in run.charts), error=error, linear=linear,
+        rounding=role == MAIN and variant.moves_inputs,
     )  # fmt: skip
 
 

@@ -42,7 +42,7 @@ def solve_rung(model: Model, job: Job, effort: Effort, blank: RunRecord, stores_
     )
     try:
         run, wall_s, cpu_s = _timed(model, job, effort, record.rung == COARSEST)
-        channels = _determined(run) if len(run.times) else {}
+        channels = determined(run) if len(run.times) else {}
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # as in `solve_job`, but the other efforts may still work
@@ -89,13 +89,13 @@ def _require_the_same(first: Trajectory, again: Trajectory) -> None:
     """The same effort must give the same run: otherwise the estimated uncertainty means nothing."""
     if again.status != first.status:
         raise BrokenContract(f"not reproducible: the same effort finished once and {again.status} the next time")
-    others = _determined(again)
-    for name, values in _determined(first).items():
+    others = determined(again)
+    for name, values in determined(first).items():
         if name not in others or not np.array_equal(values, others[name], equal_nan=True):
             raise BrokenContract(f"not reproducible: {name} differs when the same effort is run again")
 
 
-def _determined(run: Trajectory) -> dict[str, Real]:
+def determined(run: Trajectory) -> dict[str, Real]:
     """All channels (T, k) of a run, NaN in the components that the engine calls undetermined; channels of which nothing
     is left are not there."""
     is_open = Openness.of(run.undetermined)
