@@ -7,7 +7,7 @@ import os  # noqa: I001
 
 from crosscheck.cli import (  # noqa: F401 - each adds its commands, in this order
     run, bench, chart, compare, listing, verify, regenerate, export, contract, mutate, invariance, stability, sweep,
-    validate, manufacture, sensitivity,
+    validate, manufacture, sensitivity, label,
 )  # fmt: skip
 from crosscheck.cli.common import app
 from flexmb.output.readers import outlive_readers

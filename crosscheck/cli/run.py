@@ -69,12 +69,12 @@ def run(
     Run cases in all engines, judge them, write the report.
 
     **Writes** into `--out`: `report/` (open its `index.html`, to which `report.html` leads), `results.json` (small and
-    sealed, for `crosscheck compare`), `verdicts.json`, `summary.md`, `junit.xml`, `badge.svg`, `badge.json`,
-    `records.jsonl`; with `--envelope` also `envelope.csv`. With `--single-file`, `report.html` is the whole report.
-    Until the session ends they say that it is unfinished. A stopped session resumes: what is recorded is not run again
-    if scene, effort, sources, libraries and machine are the same. `crosscheck report` shows everything that the records
-    hold. One session at a time writes into a folder. An engine that exceeds its time or its part of the memory is
-    stopped: *did not finish*. The others go on.
+    sealed, for `crosscheck compare`), `verdicts.json`, `label.json` (the credibility of each case), `summary.md`,
+    `junit.xml`, `badge.svg`, `badge.json`, `records.jsonl`; with `--envelope` also `envelope.csv`. With
+    `--single-file`, `report.html` is the whole report. Until the session ends they say that it is unfinished. A stopped
+    session resumes: what is recorded is not run again if scene, effort, sources, libraries and machine are the same.
+    `crosscheck report` shows everything that the records hold. One session at a time writes into a folder. An engine
+    that exceeds its time or its part of the memory is stopped: *did not finish*. The others go on.
 
     `--accept` writes the E and U that this run has reached into `accepted.toml` beside each case's run.toml, to be
     reviewed and kept like code. Later runs say where E or U has grown to more than 10 times that, *worse than

@@ -1,4 +1,4 @@
-"""JSON schemas of the files of a case and of `results.json`, from the structs that read them. Write them with
+"""JSON schemas of a case's files, of `results.json` and of `label.json`, from their structs. Write them with
 
     python -m crosscheck.export.schemas [FOLDER]
 
@@ -14,6 +14,7 @@ from pathlib import Path
 
 import msgspec
 
+from crosscheck.label.document import LabelFile
 from crosscheck.library.accepted import Accepted
 from crosscheck.library.case import Provenance, RunFile
 from crosscheck.library.reference import Knowledge
@@ -30,6 +31,7 @@ FILES = {
     "reference": (Knowledge, "reference.toml of a case"),
     "accepted": (Accepted, "accepted.toml of a case"),
     "results": (SealedResults, "results.json of a session"),
+    "label": (LabelFile, "label.json of a session"),
 }
 """The schemas by name: the struct, and the file that it reads."""
 
@@ -41,8 +43,8 @@ def schema_text(name: str) -> str:
     for part in schema.get("$defs", {}).values():
         if "description" in part:  # a docstring, whose indentation is removed by Python 3.13 only
             part["description"] = cleandoc(part["description"])
-    if struct is SealedResults:  # the seal is set on the encoded file, and is no field of the struct
-        schema["$defs"]["SealedResults"]["properties"]["sha256"] = SEAL
+    if struct in (SealedResults, LabelFile):  # the seal is set on the encoded file, and is no field of the struct
+        schema["$defs"][struct.__name__]["properties"]["sha256"] = SEAL
     return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
 
 

@@ -93,6 +93,7 @@ finish or did not run is never as expected. Statuses are explained in `crosschec
 All keys, with defaults in brackets; the structs below explain them:
 
 - at the top: ``title``; ``tags`` [none]; ``duration_s`` (s); ``samples`` (from 0 to the end, both counted);
+  ``intended_use``, ``limits`` and ``waivers`` [not stated], words for its label;
   ``time_limit_s`` [1800] (s), for one engine on one variant with all its efforts; ``--time-limit`` comes before it;
   ``finer`` [0], how many efforts more than its own an engine has that the case does not name, in the ratio of its last
   two: chaotic motion needs finer ones than engines usually have;
@@ -338,11 +339,15 @@ class Chart(_CasePart, frozen=True, kw_only=True):
 class RunFile(_CasePart, frozen=True, kw_only=True):
     """run.toml. `time_limit_s` is how long one engine may take for one variant, all its efforts together.
 
-    `finer` is how many efforts more than its own an engine has that joins by `--engine`.
+    `finer` is how many efforts more than its own an engine has that joins by `--engine`. `intended_use`, `limits` of it
+    and `waivers` of what the use would require are words for the case's label (`crosscheck.label`), and move no level.
     """
 
     title: str
     tags: tuple[str, ...] = ()
+    intended_use: str = ""
+    limits: tuple[str, ...] = ()
+    waivers: tuple[str, ...] = ()
     duration_s: float
     samples: int
     time_limit_s: float | None = None

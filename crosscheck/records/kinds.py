@@ -27,8 +27,9 @@ class ReferenceGoals(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
 
 class RecordedReference(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The reference of `variant`: channels (T, k) at `times` (T,), their `uncertainties` (SI), and the engines that are
-    compared with it (`asked`). `routes` say how its numbers were made, and `work` what they took; older records have
-    none. If the stored files cannot be used, `fault` says why, and there are no arrays.
+    compared with it (`asked`). `routes` say how its numbers were made, `work` what they took, and `provenance` is the
+    digest of the provenance.toml that it was made with; older records have none. If the stored files cannot be used,
+    `fault` says why, and there are no arrays.
     """
 
     variant: str
@@ -39,6 +40,7 @@ class RecordedReference(msgspec.Struct, frozen=True, kw_only=True, forbid_unknow
     routes: tuple[str, ...] = ()
     work: StoredWork = {}
     made_with: tuple[str, ...] = ()
+    provenance: str = ""
     fault: str = ""
 
 
@@ -84,7 +86,8 @@ class Environment(_OneRecord, frozen=True, kw_only=True, tag="environment"):
     """Machine and versions of one session, and the cases and engines asked for; no engines means all.
 
     A session that `confirms` writes a `Confirmed` for each earlier result that it reuses; older versions did not.
-    `contracts`: of outside engines, by name, whether they keep the contract.
+    `contracts`: of outside engines, by name, whether they keep the contract. `code`: digest of our sources, "" in older
+    records.
     """
 
     started: str
@@ -97,6 +100,7 @@ class Environment(_OneRecord, frozen=True, kw_only=True, tag="environment"):
     engines: tuple[str, ...] = ()
     confirms: bool = False
     contracts: dict[str, ContractState] = {}
+    code: str = ""
 
 
 class VariantInfo(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

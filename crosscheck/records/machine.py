@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from crosscheck.library.own_files import code_here
 from crosscheck.records.kinds import Environment
 
 PACKAGES = ("flexmb", "numpy", "scipy", "numba", "msgspec")
@@ -25,6 +26,7 @@ def environment(cases: tuple[str, ...] = (), engines: tuple[str, ...] = (), conf
         cases=cases,
         engines=engines,
         confirms=confirms,
+        code=code_here(),
     )
 
 

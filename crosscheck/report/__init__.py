@@ -1,6 +1,7 @@
 """The outputs of a session, made from its records alone:
 
-verdicts.json, report/, summary.md, junit.xml, results.json, the badge and, of sessions with envelopes, envelope.csv.
+verdicts.json, report/, summary.md, junit.xml, results.json, label.json, the badge and, of sessions with envelopes,
+envelope.csv.
 """
 
 from __future__ import annotations
@@ -10,6 +11,8 @@ from pathlib import Path
 
 from crosscheck.judging.outcome import SessionOutcome, conclude
 from crosscheck.judging.results import Session, collect
+from crosscheck.label.document import FILE as LABEL
+from crosscheck.label.document import session_labels, write_label
 from crosscheck.records.archive import read
 from crosscheck.records.kinds import Record
 from crosscheck.records.machine import environment
@@ -44,12 +47,15 @@ def write_all(
     session = collect(chosen(read(records)))
     outcome = conclude(session, strict)
     write_verdicts(outcome, out / VERDICTS)
-    write_summary(outcome, out / "summary.md")
+    results = results_of(session, outcome, records)
+    labels = session_labels(session, results, out)
+    write_summary(outcome, out / "summary.md", labels)
     write_junit(outcome, out / "junit.xml", session)
-    write_results(results_of(session, outcome, records), out)
+    write_results(results, out)
+    write_label(labels, out / LABEL)
     write_badges(outcome, out)
     write_envelope(session, out)
-    material = Material(session, outcome, read_scores(out), read_maps(out))
+    material = Material(session, outcome, read_scores(out), read_maps(out), labels)
     page = write_single(material, out) if single_file else write_site(material, out)
     return outcome, page
 
@@ -60,12 +66,14 @@ UNFINISHED = SessionOutcome(verdicts={}, absences=[], unfinished=True)
 def mark_unfinished(records: Path, out: Path) -> None:
     """Let all outputs in `out` say that the session which writes the file `records` is unfinished.
 
-    `verdicts.json` is removed, since an empty list of verdicts would look like success, and `envelope.csv`. No other
+    `verdicts.json` is removed, since an empty list of verdicts would look like success, and so are `envelope.csv` and
+    `label.json`. No other
     process may write into the folder.
     """
     clear_parts(folder(out))
     take_away(out / VERDICTS)
     take_away(out / ENVELOPES)
+    take_away(out / LABEL)
     write_results(results_of(Session((environment(),), ()), UNFINISHED, records), out)
     write_junit(UNFINISHED, out / "junit.xml")
     write_summary(UNFINISHED, out / "summary.md")

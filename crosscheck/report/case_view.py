@@ -11,6 +11,8 @@ from crosscheck.judging.outcome import NO_REFERENCE, Absence, LostControl, Sessi
 from crosscheck.judging.results import CaseResults
 from crosscheck.judging.unjudged import UnjudgedChannels, grouped
 from crosscheck.judging.work import work_of
+from crosscheck.label.document import FactorRow, SubjectLabel
+from crosscheck.label.factors import TITLES
 from crosscheck.library.case import Provenance
 from crosscheck.report.mutations import CaseScore
 from crosscheck.report.peaks import PeakRow, largest_loads
@@ -48,9 +50,13 @@ class CaseView:
     timings: list[dict[str, Any]]
     peaks: list[PeakRow]
     mutation: CaseScore | None
+    label: SubjectLabel
+    factors: list[tuple[str, FactorRow]]
 
 
-def case_view(case: CaseResults, outcome: SessionOutcome, place: CasePlace, mutation: CaseScore | None) -> CaseView:
+def case_view(
+    case: CaseResults, outcome: SessionOutcome, place: CasePlace, mutation: CaseScore | None, label: SubjectLabel
+) -> CaseView:
     """Everything on a case's page but the charts."""
     record = case.case
     verdicts = outcome.verdicts[record.case]
@@ -78,6 +84,8 @@ def case_view(case: CaseResults, outcome: SessionOutcome, place: CasePlace, muta
         timings=_timings(case),
         peaks=largest_loads(case),
         mutation=mutation,
+        label=label,
+        factors=[(TITLES[factor], row) for factor, row in label.factors.items()],
     )
 
 

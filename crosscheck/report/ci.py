@@ -12,6 +12,9 @@ from crosscheck.judging.margins import WORDS
 from crosscheck.judging.outcome import NO_REFERENCE, SessionOutcome
 from crosscheck.judging.unjudged import grouped
 from crosscheck.judging.verdict import STATUSES, Verdict
+from crosscheck.label.document import FILE as LABEL
+from crosscheck.label.document import LabelFile, heads, level_rows
+from crosscheck.label.factors import FACTORS
 from crosscheck.sealed.compare import Differences
 from flexmb.output.printable import printable
 from flexmb.output.whole import write_whole
@@ -33,8 +36,9 @@ def write_verdicts(outcome: SessionOutcome, file: Path) -> None:
     write_whole(file, msgspec.json.format(msgspec.json.encode(records), indent=1) + b"\n")
 
 
-def write_summary(outcome: SessionOutcome, file: Path) -> None:
-    """summary.md: headline, counts by case, what is not as expected, did not run, is not applicable or not judged."""
+def write_summary(outcome: SessionOutcome, file: Path, labels: LabelFile | None = None) -> None:
+    """summary.md: headline, counts by case, what is not as expected, did not run, is not applicable or not judged, and
+    the levels of the labels."""
     lines = [f"# {'✅' if outcome.ok else '❌'} {_flat(outcome.headline)}", ""]
     lines += [f"| case | verdicts | as expected | {' | '.join(STATUSES)} |"]
     lines += ["|---" * (3 + len(STATUSES)) + "|"]
@@ -71,6 +75,11 @@ def write_summary(outcome: SessionOutcome, file: Path) -> None:
         if len(outcome.flagged) > SHOWN:
             lines += ["", f"... and {len(outcome.flagged) - SHOWN} more, in results.json."]
     lines += _work(outcome)
+    if labels is not None and labels.subjects:
+        lines += ["", f"## Credibility by {labels.standard}, levels 0 to 4", "", f"| case | {' | '.join(heads())} |"]
+        lines += ["|---" * (1 + len(FACTORS)) + "|"]
+        lines += [f"| {' | '.join(map(_flat, row))} |" for row in level_rows(labels.subjects)]
+        lines += ["", f"What stands behind each level is in {LABEL}, and on the pages of the cases."]
     if outcome.absences:
         lines += ["", "## What did not run to the end, and why", ""]
         for absence in outcome.absences:

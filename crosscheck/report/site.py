@@ -18,6 +18,7 @@ from markupsafe import Markup
 from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.judging.results import CaseResults, Session
 from crosscheck.judging.verdict import STATUSES
+from crosscheck.label.document import LabelFile
 from crosscheck.report.case_view import CaseView, case_view
 from crosscheck.report.charts import payload
 from crosscheck.report.html import embedded, source, templates
@@ -43,6 +44,7 @@ class Material:
     outcome: SessionOutcome
     scores: Scores
     maps: Maps
+    labels: LabelFile
 
 
 def write_site(material: Material, out: Path) -> Path:
@@ -134,7 +136,8 @@ def _overview(material: Material, where: dict[str, CasePlace]) -> dict[str, Any]
 
 
 def _view(case: CaseResults, material: Material, place: CasePlace) -> CaseView:
-    return case_view(case, material.outcome, place, material.scores.cases.get(case.case.case))
+    name = case.case.case
+    return case_view(case, material.outcome, place, material.scores.cases.get(name), material.labels.subjects[name])
 
 
 def _registration(case: CaseResults, material: Material, place: CasePlace) -> str:

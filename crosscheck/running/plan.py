@@ -347,4 +347,5 @@ def recorded_reference(case: Case, run: RunFile) -> RecordedReference | None:
         routes=stored.knowledge.routes,
         work=stored.knowledge.work,
         made_with=stored.knowledge.made_with,
+        provenance=stored.knowledge.provenance,
     )

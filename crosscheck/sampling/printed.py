@@ -44,6 +44,7 @@ from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
 ENGINE = "native"
+FILE = "sensitivity.json"
 RERUNS = 4
 RUNS = 1 + 2 * RERUNS  # of each variant
 ULP = 2

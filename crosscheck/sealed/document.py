@@ -6,7 +6,8 @@ The file is one JSON object. Every key:
 - ``sha256``: hex digest of the file without this key and the line end (`crosscheck.sealed.seal`);
 - ``unfinished`` (left out: false): the session has not ended, and the file contains no verdicts;
 - ``exit_code`` of the session (0 or 1), ``headline`` in words, ``strict``, the ``engines`` asked for (none: all);
-- ``made``: ``at`` (UTC), ``python``, ``system``, ``processor``, ``packages`` and ``engines`` with their versions;
+- ``made``: ``at`` (UTC), ``python``, ``system``, ``processor``, ``packages`` and ``engines`` with their versions, and
+  ``code``, a digest of all sources of flexmb and crosscheck (left out: the session is of an older version);
 - ``contracts`` (left out if empty): of outside engines by name whether they keep the contract: digest of their
   ``sources``, ``kept`` (left out: all clauses were never tried), ``at``, ``headline`` and what has ``changed`` since;
 - ``records``: SHA-256 of the records.jsonl that was judged, "" if there was none; ``broken``: the number of its invalid
@@ -133,6 +134,7 @@ class Origin(_SealedPart, frozen=True, kw_only=True):
     processor: str = ""
     packages: dict[str, str] = {}
     engines: dict[str, str] = {}
+    code: str = ""
 
 
 class SealedResults(_SealedPart, frozen=True, kw_only=True):
@@ -163,7 +165,7 @@ def results_of(session: Session, outcome: SessionOutcome, records: Path) -> Seal
     }
     made = Origin() if latest is None else Origin(
         at=latest.started, python=latest.python, system=latest.system, processor=latest.processor,
-        packages=latest.packages, engines=versions,
+        packages=latest.packages, engines=versions, code=latest.code,
     )  # fmt: skip
     return SealedResults(
         format=FORMAT,

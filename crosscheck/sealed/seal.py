@@ -33,7 +33,7 @@ class ResultsError(ValueError):
 def sealed_text(results: SealedResults) -> str:
     """The text of results.json."""
     content = msgspec.to_builtins(results)
-    return _canonical(content | {SEAL: _seal(content)}) + "\n"
+    return _canonical(content | {SEAL: seal_of(content)}) + "\n"
 
 
 def write_results(results: SealedResults, folder: Path) -> None:
@@ -56,7 +56,7 @@ def read_results(file: Path) -> SealedResults:
     if content.get("version") != VERSION:
         raise ResultsError(f"{file} is of version {content.get('version')!r:.40}: this crosscheck reads {VERSION}")
     claimed = content.pop(SEAL, None)
-    if claimed != _seal(content) or data != (_canonical(content | {SEAL: claimed}) + "\n").encode("ascii"):
+    if claimed != seal_of(content) or data != (_canonical(content | {SEAL: claimed}) + "\n").encode("ascii"):
         raise ResultsError(f"{file} was changed after it was written: its seal does not fit what it says")
     try:
         return msgspec.convert(content, SealedResults)
@@ -73,7 +73,8 @@ def read_finished(file: Path) -> SealedResults:
     return results
 
 
-def _seal(content: dict[str, Any]) -> str:
+def seal_of(content: dict[str, Any]) -> str:
+    """The digest of the canonical form; ValueError where it holds a number that JSON has not."""
     return hashlib.sha256(_canonical(content).encode("ascii")).hexdigest()
 
 

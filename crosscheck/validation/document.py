@@ -6,14 +6,16 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.sealed.stamp import stamped
 from crosscheck.validation.budget import Budget, SeriesVerdict
 
 
 def document(budget: Budget) -> dict[str, Any]:
-    """Series with their verdicts, inputs, and each point with all parts of its budget, in the units of the series."""
+    """Series with their verdicts, inputs, and each point with all parts of its budget, in the units of the series; with
+    a stamp, by which it is evidence for a label."""
     content, sampled, verdicts = budget.of.content, budget.sampled, budget.verdicts()
     told = ("title", "physics", "read_from", "instrument", "licence", "digitised", "fitted", "left_out")
-    return {key: getattr(content, key) for key in told} | {
+    found = {key: getattr(content, key) for key in told} | {
         "sources": list(content.sources),
         "ok": all(verdict.ok for verdict in verdicts),
         "within": int(np.sum(budget.within)),
@@ -39,6 +41,7 @@ def document(budget: Budget) -> dict[str, Any]:
             for i, point in enumerate(budget.of.points)
         ],
     }  # fmt: skip
+    return stamped(found, budget.of.folder)
 
 
 def _identified(budget: Budget) -> dict[str, Any] | None:

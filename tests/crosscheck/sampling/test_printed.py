@@ -125,6 +125,6 @@ def test_the_command_says_its_runs_before_and_names_what_fails(monkeypatch: pyte
     result = CliRunner().invoke(cli.app, ["sensitivity", str(CASE), "--json"])
     assert result.exit_code == 1
     told = json.loads(result.stdout[result.stdout.index("{") :])
-    (of_variant,) = next(iter(told.values())).values()
+    (of_variant,) = next(iter(told.values()))["variants"].values()
     assert of_variant["failed"] == ["it stopped at t = 1 s"]
     assert f"{RUNS} runs of native" in result.output
