@@ -19,7 +19,7 @@ TOLERANCES = (1e-4, 1e-6)  # of Newton's method, with a Jacobian that is kept as
 SPARSE = 12  # elements from which the sparse solver is faster than the dense one
 METHODS = "GeneralizedAlpha", "TrapezoidalIndex2"
 HALVINGS = 9
-LOAD_STEPS = 5
+LOAD_STEPS = (1, 2, 5)
 
 
 def in_plane(scene: fm.Scene, count: int, times: np.ndarray) -> Iterator[Ladder]:
@@ -68,7 +68,7 @@ def at_rest(scene: fm.Scene, count: int, load: float) -> Iterator[Ladder]:
         place = beam.shop.mbs.GetNodeOutput(beam.nodes[-1], beam.shop.exu.OutputVariableType.Position)
         return np.array(place)[None, None, :]
 
-    yield Ladder(str(count), [partial(rest, beam, load, count >= SPARSE)], read)
+    yield Ladder(str(count), [partial(rest, beam, load, count >= SPARSE, steps) for steps in LOAD_STEPS], read)
 
 
 def at_rest_in_space(scene: fm.Scene, count: int, load: float) -> Iterator[Ladder]:
@@ -83,10 +83,11 @@ def at_rest_in_space(scene: fm.Scene, count: int, load: float) -> Iterator[Ladde
         recorder.take(load)
         return model.markers(recorder.states())["tip"].position[None]
 
-    yield Ladder(str(count), [partial(rest, model.assembly, load, count >= SPARSE)], read)
+    rungs = [partial(rest, model.assembly, load, count >= SPARSE, steps) for steps in LOAD_STEPS]
+    yield Ladder(str(count), rungs, read)
 
 
-def rest(assembly: Any, load: float, sparse: bool) -> None:
+def rest(assembly: Any, load: float, sparse: bool, steps: int) -> None:
     """Leaves the equilibrium in the system as its state."""
     shop = assembly.shop
     settings = shop.exu.SimulationSettings()
@@ -94,7 +95,7 @@ def rest(assembly: Any, load: float, sparse: bool) -> None:
     solvers = shop.exu.LinearSolverType
     settings.linearSolver.solverType = solvers.EigenSparse if sparse else solvers.EXUdense
     static = settings.staticSolver
-    static.verboseMode, static.numberOfLoadSteps, static.loadStepDuration = 0, LOAD_STEPS, load
+    static.verboseMode, static.numberOfLoadSteps, static.loadStepDuration = 0, steps, load
     static.newton.relativeTolerance = 1e-9
     shop.mbs.SolveStatic(settings, updateInitialValues=False, showHints=False)
 

@@ -15,6 +15,7 @@ Paths = np.ndarray  # positions (M,T,3) of M markers at T times, in m; of proble
 REPEATS = 3
 SHORT_S = 0.3  # a run that takes longer is not repeated
 LONG_S = 2.0  # and after one that takes longer than this, the same parts are not run with smaller steps
+NONE = 0.1  # an error of this part of the length and more is no solution
 WORTH = 0.9  # an error that is less than this part of another is worth a longer run
 GAIN = 0.7  # smaller steps that leave more of the error than this part have shown what the parts can do
 
@@ -85,9 +86,9 @@ def timed(run: Callable[[], Any]) -> tuple[Any, float]:
 
 def front(points: Iterable[Point]) -> list[Point]:
     """Those that no other point beats in both time and error, from the fastest to the most accurate; without those that
-    are hardly more accurate than a faster one."""
+    are hardly more accurate than a faster one, and without those that are no solution."""
     kept: list[Point] = []
     for point in sorted(points, key=lambda each: (each.seconds, each.error)):
-        if not kept or point.error < WORTH * kept[-1].error:
+        if point.error < (WORTH * kept[-1].error if kept else NONE):
             kept.append(point)
     return kept

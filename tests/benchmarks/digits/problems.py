@@ -14,12 +14,14 @@ from flexmb.scene import schema as s
 from flexmb.scene.functions import Ramp
 from flexmb.surrogate import substructured
 from tests.benchmarks import exact_scenes as scenes
-from tests.benchmarks.digits import elements, native
+from tests.benchmarks.digits import elements, native, others
 from tests.benchmarks.digits.problem import Ladder, Problem
+from tests.benchmarks.digits.shooting import tip
 from tests.benchmarks.must_hold.exact import LOAD, elastica
 from tests.repo.project import ROOT
 
 EXACT, PIECES, ELEMENTS = "exact: polynomials", "stiffened: pieces", "Exudyn: elements"
+KRATOS, RODS = "Kratos: elements", "MuJoCo: rods"
 CASES = ROOT / "cases"
 SMOOTH: tuple[Method, ...] = ("dop853", "radau5")
 FLOWN = (0.0625 / 16.0, 0.0625 / 32.0)  # s: steps of Exudyn's 128 elements, extrapolated
@@ -31,8 +33,8 @@ Family = Callable[[], Iterator[Ladder]]
 def problems() -> list[Problem]:
     """At rest first, then in motion."""
     return [
-        _rolled_up(), _elastica_at_rest(), _princeton(), _bend(), _elastica(), _spun(), _pendulum(), _spaghetti(),
-        _elbow(), _frame(), _crank(), _blade(), _four_bar(),
+        _rolled_up(), _elastica_at_rest(), _princeton(), _bend(), _elastica(), _spun(), _spun_rods(), _pendulum(),
+        _spaghetti(), _elbow(), _frame(), _crank(), _blade(), _four_bar(),
     ]  # fmt: skip
 
 
@@ -110,6 +112,7 @@ def _elastica_at_rest() -> Problem:
         lambda: np.append(elastica(LOAD), 0.0)[None, None, :], "elliptic integrals",
         {
             EXACT: resting(partial(scenes.bending, scene), (2, 3, 4, 5, 6, 8), LOAD),
+            KRATOS: over((4, 8, 16, 32, 64), lambda n: others.at_rest(scene, n, LOAD)),
             PIECES: resting(cut(scene), (2, 4, 8, 16, 32), LOAD),
             ELEMENTS: over((4, 8, 16, 32, 64), lambda n: elements.at_rest(scene, n, LOAD)),
         },
@@ -131,10 +134,12 @@ def _princeton() -> Problem:
     assert isinstance(beam, s.BeamBody)
     beam = replace(beam, theory="timoshenko", modes=replace(beam.modes, families=("axial", *beam.modes.families)))
     return Problem(
-        "princeton", "Princeton beam at 45°, at rest", beam.length_m, native.converged_rest(exact(8), load),
-        "level exact with more polynomials; Exudyn's elements, extrapolated, come to within 5e-8 m",
+        "princeton", "Princeton beam at 45°, at rest", beam.length_m,
+        lambda: tip(beam, load * np.array([0.0, np.cos(angle), np.sin(angle)]))[None, None, :],
+        "shooting, which level exact with 8 polynomials meets to 1e-10 m",
         {
             EXACT: resting(exact, (2, 3, 4, 5, 6), load),
+            KRATOS: over((4, 8, 16, 32, 64, 128), lambda n: others.at_rest(exact(4), n, load)),
             PIECES: resting(cut(replace(bar, bodies=(beam,)), eigenmodes=4), (2, 4, 8, 16), load),
             ELEMENTS: over((4, 8, 16, 32, 64), lambda n: elements.at_rest_in_space(exact(4), n, load)),
         },
@@ -152,6 +157,7 @@ def _bend() -> Problem:
         native.converged_rest(scenes.bend_45(8, 6), load), "level exact with more polynomials",
         {
             EXACT: resting(exact, (2, 3, 4, 5, 6), load),
+            KRATOS: over((4, 8, 16, 32, 64), lambda n: others.at_rest(exact(4), n, load)),
             ELEMENTS: over((4, 8, 16, 32, 64), lambda n: elements.at_rest_in_space(exact(4), n, load)),
         },
     )  # fmt: skip
@@ -180,6 +186,20 @@ def _spun() -> Problem:
             EXACT: moving(exact, (2, 3, 4, 5, 6), times),
             PIECES: moving(cut(scene), (1, 2, 4, 8, 16), times),
             ELEMENTS: over((4, 8, 16, 32), lambda n: elements.in_plane(scene, n, times)),
+        },
+    )  # fmt: skip
+
+
+def _spun_rods() -> Problem:
+    """The same beside MuJoCo's rods alone: they take a hundred times as long as all others together."""
+    scene, times = scene_of("spinning_beam/beam_k_supercritical"), np.linspace(0.0, 8.0, 161)
+    (beam,) = scene.bodies
+    exact = partial(scenes.bending, scene)
+    return Problem(
+        "spun_rods", "The same beside rods", beam.length_m, native.converged(exact(9), times), OWN,
+        {
+            EXACT: moving(exact, (2, 3, 4, 5), times, ("radau5",)),
+            RODS: over((4, 8, 16), lambda n: others.rods(scene, n, times)),
         },
     )  # fmt: skip
 
