@@ -11,7 +11,7 @@ import typer
 from crosscheck.cli import common
 
 if TYPE_CHECKING:
-    from crosscheck.label.evidence import Subject
+    from crosscheck.label.evidence import Labelled
 
 
 @common.app.command()
@@ -70,7 +70,7 @@ def label(
         common.print_json(json.loads(label_text(labels)))
 
 
-def _session(words: list[str]) -> tuple[list[Subject], Path] | None:
+def _session(words: list[str]) -> tuple[list[Labelled], Path] | None:
     """The cases of a session's folder, and the folder; None if the words are something else."""
     from crosscheck.sealed.seal import FILE, ResultsError, read_finished
 
@@ -92,7 +92,7 @@ def _place(name: str, session: Path) -> str:
     return str(made) if name.startswith("cases/") and made.is_dir() else name
 
 
-def _subjects(words: list[str]) -> list[Subject]:
+def _subjects(words: list[str]) -> list[Labelled]:
     """Cases and measured sets; exit code 2 at the first word that is neither."""
     from crosscheck.label.evidence import of_case, of_measured_set
     from crosscheck.validation.measured_set import FILE, find_sets, shipped_sets

@@ -18,7 +18,7 @@ from typing import Annotated
 import msgspec
 
 from crosscheck.judging.results import Session
-from crosscheck.label.evidence import Evidence, Piece, Subject, evidence, of_record
+from crosscheck.label.evidence import Exhibits, Labelled, Piece, evidence, of_record
 from crosscheck.label.factors import CRITERIA, FACTORS, HIGHEST, TITLES, Factor
 from crosscheck.label.ladder import looked
 from crosscheck.sealed.document import SealedResults
@@ -68,7 +68,7 @@ class LabelFile(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     subjects: dict[str, SubjectLabel]
 
 
-def label(subject: Subject, found: Evidence) -> SubjectLabel:
+def label(subject: Labelled, found: Exhibits) -> SubjectLabel:
     """The label of a subject by its evidence."""
     run = subject.run
     return SubjectLabel(
@@ -111,7 +111,7 @@ def level_rows(labels: Mapping[str, SubjectLabel]) -> Iterable[tuple[str, ...]]:
     return ((name, *map(str, each.levels)) for name, each in labels.items())
 
 
-def _row(factor: Factor, subject: Subject, found: Evidence) -> FactorRow:
+def _row(factor: Factor, subject: Labelled, found: Exhibits) -> FactorRow:
     of = looked(factor, subject, found)
     met = [rung for rung in of.rungs if rung.met]
     level = met[-1].level if met else 0

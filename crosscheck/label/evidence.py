@@ -47,7 +47,7 @@ class Piece(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 @dataclass(frozen=True)
-class Found(Generic[T]):
+class Exhibit(Generic[T]):
     """A piece of evidence with what it says; None unless it is fresh."""
 
     piece: Piece
@@ -55,7 +55,7 @@ class Found(Generic[T]):
 
 
 @dataclass(frozen=True)
-class Subject:
+class Labelled:
     """What is labelled: a case, or a measured set, which has no `run`.
 
     `files` and `code` are the digests that evidence must have; `reference` is the case's stored one.
@@ -67,7 +67,7 @@ class Subject:
     provenance: Provenance | None
     files: Mapping[str, str]
     code: str
-    reference: Found[Basis]
+    reference: Exhibit[Basis]
 
     @property
     def measured(self) -> bool:
@@ -130,42 +130,42 @@ class SessionEvidence:
 
 
 @dataclass(frozen=True)
-class Evidence:
+class Exhibits:
     """All that may stand behind a label."""
 
-    provenance: Found[Provenance]
-    reference: Found[Basis]
-    session: Found[SessionEvidence]
-    spreads: Found[Spreads]
-    budgets: Found[Budgets]
+    provenance: Exhibit[Provenance]
+    reference: Exhibit[Basis]
+    session: Exhibit[SessionEvidence]
+    spreads: Exhibit[Spreads]
+    budgets: Exhibit[Budgets]
 
 
-def of_case(case: Case) -> Subject:
+def of_case(case: Case) -> Labelled:
     """A case as its folder and the code are now."""
-    return Subject(
+    return Labelled(
         case.name, case.run.title, case.run, case.provenance, case_digests(case.folder), code_here(), _stored(case)
     )
 
 
-def of_record(record: CaseRecord, code: str) -> Subject:
+def of_record(record: CaseRecord, code: str) -> Labelled:
     """A case as a session ran it, by code with this digest."""
     stored = record.reference
     if stored is None:
-        reference = Found[Basis](_absent(KNOWLEDGE))
+        reference = Exhibit[Basis](_absent(KNOWLEDGE))
     else:
         provenance = record.files.get(PROVENANCE, NO_PROVENANCE)
         why = stored.fault or _of_another_provenance(stored.provenance, provenance)
         reference = _unless(why, KNOWLEDGE, basis(stored.routes))
-    return Subject(record.case, record.run.title, record.run, record.provenance, record.files, code, reference)
+    return Labelled(record.case, record.run.title, record.run, record.provenance, record.files, code, reference)
 
 
-def of_measured_set(name: str, title: str, folder: Path) -> Subject:
+def of_measured_set(name: str, title: str, folder: Path) -> Labelled:
     """A measured set without a case, as its folder and the code are now."""
-    nothing = Found[Basis](Piece(file=KNOWLEDGE, state="absent", why="a measured set has none"))
-    return Subject(name, title, None, None, case_digests(folder), code_here(), nothing)
+    nothing = Exhibit[Basis](Piece(file=KNOWLEDGE, state="absent", why="a measured set has none"))
+    return Labelled(name, title, None, None, case_digests(folder), code_here(), nothing)
 
 
-def evidence(subject: Subject, folder: Path, results: SealedResults | None = None) -> Evidence:
+def evidence(subject: Labelled, folder: Path, results: SealedResults | None = None) -> Exhibits:
     """What is on file of a subject: in its own folder, and in the folder of a session; `results` are the session's
     where they were not read from there."""
     set_name = subject.name.rpartition("/")[2]
@@ -173,31 +173,31 @@ def evidence(subject: Subject, folder: Path, results: SealedResults | None = Non
     budgets = (
         _stamped(folder / BUDGETS, set_name, subject, Budgets)
         if subject.measured
-        else Found[Budgets](Piece(file=BUDGETS, state="absent", why=f"there is no {MEASURED} in its folder"))
+        else Exhibit[Budgets](Piece(file=BUDGETS, state="absent", why=f"there is no {MEASURED} in its folder"))
     )
-    absent = Found[Provenance](_absent(PROVENANCE))
+    absent = Exhibit[Provenance](_absent(PROVENANCE))
     provenance = absent if subject.provenance is None else _unless("", PROVENANCE, subject.provenance)
-    return Evidence(provenance, subject.reference, _session(subject, folder / RESULTS, results), spreads, budgets)
+    return Exhibits(provenance, subject.reference, _session(subject, folder / RESULTS, results), spreads, budgets)
 
 
-def _session(subject: Subject, file: Path, results: SealedResults | None) -> Found[SessionEvidence]:
+def _session(subject: Labelled, file: Path, results: SealedResults | None) -> Exhibit[SessionEvidence]:
     if results is None:
         if not file.exists():
-            return Found(_absent(RESULTS))
+            return Exhibit(_absent(RESULTS))
         try:
             results = read_finished(file)
         except ResultsError as error:
-            return Found(Piece(file=RESULTS, state="broken", why=str(error).removeprefix(f"{file} ")))
+            return Exhibit(Piece(file=RESULTS, state="broken", why=str(error).removeprefix(f"{file} ")))
     case = results.cases.get(subject.name)
     if case is None:
-        return Found(Piece(file=RESULTS, state="absent", why="the case is not in this session"))
+        return Exhibit(Piece(file=RESULTS, state="absent", why="the case is not in this session"))
     why = unlike(subject.files, subject.code, case.files, results.made.code)
     return _unless(why, RESULTS, SessionEvidence(case, results.strict, results.exit_code == 0))
 
 
-def _stored(case: Case) -> Found[Basis]:
+def _stored(case: Case) -> Exhibit[Basis]:
     if not has_reference(case.folder):
-        return Found(_absent(KNOWLEDGE))
+        return Exhibit(_absent(KNOWLEDGE))
     try:
         known = current_reference(case).knowledge
     except CaseError as error:
@@ -210,30 +210,32 @@ def _of_another_provenance(then: str, now: str) -> str:
     return "" if then == now else f"{PROVENANCE} changed since"
 
 
-def _stamped(file: Path, name: str, subject: Subject, kind: type[T]) -> Found[T]:
+def _stamped(file: Path, name: str, subject: Labelled, kind: type[T]) -> Exhibit[T]:
     """What a stamped file says of a name."""
     try:
         every = json.loads(read_bytes(file, LIMIT).decode())
     except FileNotFoundError:
-        return Found(_absent(file.name))
+        return Exhibit(_absent(file.name))
     except (OSError, Unreadable, ValueError, RecursionError) as error:
-        return Found(Piece(file=file.name, state="broken", why=f"it cannot be read: {error}"))
+        return Exhibit(Piece(file=file.name, state="broken", why=f"it cannot be read: {error}"))
     content = every.get(name) if isinstance(every, dict) else None
     if content is None:
-        return Found(Piece(file=file.name, state="absent", why=f"it says nothing of {name}"))
+        return Exhibit(Piece(file=file.name, state="absent", why=f"it says nothing of {name}"))
     broken, changed = opened(content, subject.files, subject.code)
     if broken:
-        return Found(Piece(file=file.name, state="broken", why=broken))
+        return Exhibit(Piece(file=file.name, state="broken", why=broken))
     try:
         return _unless(changed, file.name, msgspec.convert(content, kind))
     except msgspec.ValidationError as error:
-        return Found(Piece(file=file.name, state="broken", why=str(error)))
+        return Exhibit(Piece(file=file.name, state="broken", why=str(error)))
 
 
 def _absent(file: str) -> Piece:
     return Piece(file=file, state="absent")
 
 
-def _unless(why: str, file: str, content: T | None) -> Found[T]:
+def _unless(why: str, file: str, content: T | None) -> Exhibit[T]:
     """Fresh evidence, or stale for a reason."""
-    return Found(Piece(file=file, state="stale", why=why)) if why else Found(Piece(file=file, state="fresh"), content)
+    if why:
+        return Exhibit(Piece(file=file, state="stale", why=why))
+    return Exhibit(Piece(file=file, state="fresh"), content)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from crosscheck.judging.against_reference import REFERENCE
 from crosscheck.judging.outcome import FAULTS
 from crosscheck.judging.unjudged import UNSAID
-from crosscheck.label.evidence import MEASURED, PROVENANCE, Evidence, Piece, SessionEvidence, Subject
+from crosscheck.label.evidence import MEASURED, PROVENANCE, Exhibits, Labelled, Piece, SessionEvidence
 from crosscheck.label.factors import Factor
 from crosscheck.library.basis import Basis
 from crosscheck.sealed.document import SealedCase, SealedVerdict
@@ -21,7 +21,7 @@ BY_PEOPLE = "no file shows it: an assessment by people who know the intended use
 
 
 @dataclass(frozen=True)
-class Rung:
+class FactorRung:
     """A level, whether the files reach it, what they say of it, and what would reach it."""
 
     level: int
@@ -34,34 +34,34 @@ class Rung:
 class Looked:
     """A factor's rungs, from the lowest, and the pieces of evidence that were looked at."""
 
-    rungs: tuple[Rung, ...]
+    rungs: tuple[FactorRung, ...]
     pieces: tuple[Piece, ...]
 
 
-def looked(factor: Factor, subject: Subject, found: Evidence) -> Looked:
+def looked(factor: Factor, subject: Labelled, found: Exhibits) -> Looked:
     """What the evidence says of a factor."""
     rules, pieces = RULES[factor]
     return Looked(tuple(rules(subject, found)), tuple(pieces(found)))
 
 
-def _data_pedigree(subject: Subject, found: Evidence) -> Iterator[Rung]:
+def _data_pedigree(subject: Labelled, found: Exhibits) -> Iterator[FactorRung]:
     provenance, budgets = found.provenance.content, found.budgets.content
     sources = provenance.sources if provenance else budgets.sources if budgets else ()
-    yield Rung(1, bool(sources), f"{len(sources)} sources are named", _name_sources(subject))
+    yield FactorRung(1, bool(sources), f"{len(sources)} sources are named", _name_sources(subject))
     anchors = provenance.anchors if provenance else ()
     readings = f"{budgets.points} readings with a width" if budgets else ""
-    yield Rung(
+    yield FactorRung(
         2, bool(anchors or budgets), readings or f"{len(anchors)} published numbers with source and uncertainty",
         f"give published numbers as [[anchor]] of {PROVENANCE}, or readings: {_validate(subject)}",
     )  # fmt: skip
-    yield Rung(
+    yield FactorRung(
         3, budgets is not None and all(series.stated for series in budgets.series),
         "the source states the width of every reading", "a measured set whose source states the width of its readings",
     )  # fmt: skip
-    yield Rung(4, False, "", BY_PEOPLE)
+    yield FactorRung(4, False, "", BY_PEOPLE)
 
 
-def _verification(subject: Subject, found: Evidence) -> Iterator[Rung]:
+def _verification(subject: Labelled, found: Exhibits) -> Iterator[FactorRung]:
     routes, session, budgets = found.reference.content, found.session.content, found.budgets.content
     agreed = _agreements(session.case) if session else {}
     runs = _by(subject, "run")
@@ -70,27 +70,27 @@ def _verification(subject: Subject, found: Evidence) -> Iterator[Rung]:
         else f"{len(agreed)} channels agree" if agreed
         else "predictions are refined"
     )  # fmt: skip
-    yield Rung(1, bool(routes or agreed or budgets), says, runs)
+    yield FactorRung(1, bool(routes or agreed or budgets), says, runs)
     apart = [key for key in agreed if _independent(key, routes)]
     independent = routes is not None and not routes.alone
     says = f"{len(apart)} channels of independent codes agree" if apart else says
-    yield Rung(2, bool(independent or apart), says, f"{runs}, by an independent code")
+    yield FactorRung(2, bool(independent or apart), says, f"{runs}, by an independent code")
     controls = _controls(session.case) if session else {}
     noticed = sum(controls.values())
     says = f"{says}, each with E within U, {noticed} of {len(controls)} planted faults are noticed"
     open_ends = _open_ends(session.case) if session else ["there is no fresh session"]
     estimated = bool(apart) and bool(noticed) and noticed == len(controls) and not _failed_agreements(session)
-    yield Rung(
+    yield FactorRung(
         3, estimated, says,
         runs if session is None or controls else "plant a fault: add a [[control]] to run.toml, and run it",
     )  # fmt: skip
-    yield Rung(4, estimated and not open_ends, f"{says}; nothing else is open", "; ".join(open_ends) or runs)
+    yield FactorRung(4, estimated and not open_ends, f"{says}; nothing else is open", "; ".join(open_ends) or runs)
 
 
-def _validation(subject: Subject, found: Evidence) -> Iterator[Rung]:
+def _validation(subject: Labelled, found: Exhibits) -> Iterator[FactorRung]:
     provenance, budgets = found.provenance.content, found.budgets.content
     anchors = provenance.anchors if provenance and found.reference.content else ()
-    yield Rung(
+    yield FactorRung(
         1, bool(anchors), f"the stored reference meets {len(anchors)} published numbers",
         f"give published numbers as [[anchor]] of {PROVENANCE}, then {_by(subject, 'regenerate')}"
         if subject.run else _validate(subject),
@@ -98,92 +98,92 @@ def _validation(subject: Subject, found: Evidence) -> Iterator[Rung]:
     series = budgets.series if budgets else ()
     valid = [each for each in series if each.standing == "validated"]
     says = f"{len(valid)} of {len(series)} series are within their validation uncertainty"
-    yield Rung(2, bool(series), says, _validate(subject))
-    yield Rung(3, bool(series) and len(valid) == len(series), says, "a model whose error no series shows")
-    yield Rung(4, False, "", BY_PEOPLE)
+    yield FactorRung(2, bool(series), says, _validate(subject))
+    yield FactorRung(3, bool(series) and len(valid) == len(series), says, "a model whose error no series shows")
+    yield FactorRung(4, False, "", BY_PEOPLE)
 
 
-def _input_pedigree(subject: Subject, found: Evidence) -> Iterator[Rung]:
+def _input_pedigree(subject: Labelled, found: Exhibits) -> Iterator[FactorRung]:
     provenance, budgets = found.provenance.content, found.budgets.content
     sources = provenance.sources if provenance else budgets.sources if budgets else ()
-    yield Rung(1, bool(sources), f"{len(sources)} sources are named", _name_sources(subject))
+    yield FactorRung(1, bool(sources), f"{len(sources)} sources are named", _name_sources(subject))
     inputs = budgets.inputs if budgets else ()
     stated = sum(each.stated for each in inputs)
     says = f"{len(inputs)} inputs have a width, {stated} of them as the source states it"
-    yield Rung(2, bool(inputs), says, _validate(subject))
-    yield Rung(3, bool(inputs) and stated == len(inputs), says, "inputs whose widths the source states")
-    yield Rung(4, False, "", BY_PEOPLE)
+    yield FactorRung(2, bool(inputs), says, _validate(subject))
+    yield FactorRung(3, bool(inputs) and stated == len(inputs), says, "inputs whose widths the source states")
+    yield FactorRung(4, False, "", BY_PEOPLE)
 
 
-def _uncertainty(subject: Subject, found: Evidence) -> Iterator[Rung]:
+def _uncertainty(subject: Labelled, found: Exhibits) -> Iterator[FactorRung]:
     routes, session, budgets = found.reference.content, found.session.content, found.budgets.content
     known = len(_agreements(session.case)) if session else 0
     says = f"U of {known} agreements" if known else "U of every channel of the stored reference"
     numbers = bool(routes or known or budgets)
-    yield Rung(1, numbers, "u_num of every point" if budgets else says, _by(subject, "run"))
+    yield FactorRung(1, numbers, "u_num of every point" if budgets else says, _by(subject, "run"))
     spread, has_spread = _spread(found)
-    yield Rung(
+    yield FactorRung(
         2, bool(numbers and has_spread), f"{says}; {spread}",
         _by(subject, "sensitivity", " --out OUT, beside a fresh session or reference"),
     )  # fmt: skip
     points = f"u_num, u_input and u_D of {budgets.points if budgets else 0} points"
-    yield Rung(3, budgets is not None, points, _validate(subject))
+    yield FactorRung(3, budgets is not None, points, _validate(subject))
     samples = budgets.samples if budgets else 0
-    yield Rung(
+    yield FactorRung(
         4, samples > 0, f"{points}, beside {samples} samples of all inputs",
         _validate(subject, " --samples 200 --out OUT"),
     )  # fmt: skip
 
 
-def _robustness(subject: Subject, found: Evidence) -> Iterator[Rung]:
+def _robustness(subject: Labelled, found: Exhibits) -> Iterator[FactorRung]:
     session, budgets = found.session.content, found.budgets.content
     controls = _controls(session.case) if session else {}
     noticed = sum(controls.values())
-    yield Rung(
+    yield FactorRung(
         1, noticed > 0, f"{noticed} of {len(controls)} planted faults change the results",
         _by(subject, "run", ", with a [[control]] in run.toml"),
     )  # fmt: skip
     spread, has_spread = _spread(found)
-    yield Rung(2, has_spread, spread, _by(subject, "sensitivity", " --out OUT"))
+    yield FactorRung(2, has_spread, spread, _by(subject, "sensitivity", " --out OUT"))
     inputs = budgets.inputs if budgets else ()
-    yield Rung(
+    yield FactorRung(
         3, bool(inputs), f"derivatives of every point by {len(inputs)} inputs",
         _validate(subject),
     )  # fmt: skip
-    yield Rung(4, False, "", BY_PEOPLE)
+    yield FactorRung(4, False, "", BY_PEOPLE)
 
 
-def _history(subject: Subject, found: Evidence) -> Iterator[Rung]:
+def _history(subject: Labelled, found: Exhibits) -> Iterator[FactorRung]:
     routes, session, budgets = found.reference.content, found.session.content, found.budgets.content
     as_said = budgets is not None and all(series.ok for series in budgets.series)
     says = "a reference is stored" if routes else "all series come out as their file says"
-    yield Rung(1, routes is not None or as_said, says, _by(subject, "regenerate"))
+    yield FactorRung(1, routes is not None or as_said, says, _by(subject, "regenerate"))
     verdicts = _against_reference(session.case) if session else []
     good = sum(verdict.status == "agree" for verdict in verdicts)
-    yield Rung(
+    yield FactorRung(
         2, routes is not None and bool(verdicts) and good == len(verdicts),
         f"{good} of {len(verdicts)} channels agree with the stored reference", _by(subject, "run"),
     )  # fmt: skip
-    yield Rung(3, False, "", f"{BY_PEOPLE}; a budget is made when the measurements are known already")
-    yield Rung(4, False, "", BY_PEOPLE)
+    yield FactorRung(3, False, "", f"{BY_PEOPLE}; a budget is made when the measurements are known already")
+    yield FactorRung(4, False, "", BY_PEOPLE)
 
 
-def _management(subject: Subject, found: Evidence) -> Iterator[Rung]:
+def _management(subject: Labelled, found: Exhibits) -> Iterator[FactorRung]:
     session = found.session.content
     stamps = [each.piece.file for each in (found.reference, found.spreads, found.budgets) if each.content is not None]
-    yield Rung(
+    yield FactorRung(
         1, bool(stamps or session), f"{', '.join(stamps)} of this very scene" if stamps else "a sealed session",
         _by(subject, "run"),
     )  # fmt: skip
     says = "a sealed session with the digests of all files and of the code"
-    yield Rung(2, session is not None, says, _by(subject, "run"))
+    yield FactorRung(2, session is not None, says, _by(subject, "run"))
     strict = session is not None and session.strict and session.green
-    yield Rung(3, strict, f"{says}, green by the strict rules", _by(subject, "run", " --strict, green"))
-    yield Rung(4, False, "", BY_PEOPLE)
+    yield FactorRung(3, strict, f"{says}, green by the strict rules", _by(subject, "run", " --strict, green"))
+    yield FactorRung(4, False, "", BY_PEOPLE)
 
 
-Rules = Callable[[Subject, Evidence], Iterator[Rung]]
-Pieces = Callable[[Evidence], Iterator[Piece]]
+Rules = Callable[[Labelled, Exhibits], Iterator[FactorRung]]
+Pieces = Callable[[Exhibits], Iterator[Piece]]
 
 
 def _of(*names: str) -> Pieces:
@@ -202,21 +202,21 @@ RULES: dict[Factor, tuple[Rules, Pieces]] = {
 }
 
 
-def _by(subject: Subject, command: str, more: str = "") -> str:
+def _by(subject: Labelled, command: str, more: str = "") -> str:
     """The command on a case; a measured set has no case yet."""
     if subject.run is None:
         return f"a run.toml beside {MEASURED}, then crosscheck {command}{more}"
     return f"crosscheck {command} {subject.name}{more}"
 
 
-def _validate(subject: Subject, more: str = " --out OUT") -> str:
+def _validate(subject: Labelled, more: str = " --out OUT") -> str:
     """The command that makes a budget; a case has no readings yet unless they lie beside it."""
     if subject.measured:
         return f"crosscheck validate {subject.name if subject.run is None else 'FOLDER'}{more}"
     return f"{MEASURED}, points.csv and model.py beside run.toml, then crosscheck validate FOLDER{more}"
 
 
-def _name_sources(subject: Subject) -> str:
+def _name_sources(subject: Labelled) -> str:
     return _validate(subject) if subject.run is None else f"name sources in {PROVENANCE}"
 
 
@@ -283,7 +283,7 @@ def _open_ends(case: SealedCase) -> list[str]:
     return [*open_ends, "the reference was never made"] if case.unreferenced else open_ends
 
 
-def _spread(found: Evidence) -> tuple[str, bool]:
+def _spread(found: Exhibits) -> tuple[str, bool]:
     """The largest spread by the printed digits of all inputs, in words, and whether it is known."""
     spreads = found.spreads.content
     if spreads is None or any(each.failed for each in spreads.variants.values()):

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from crosscheck import cli
 from crosscheck.label.document import FILE, LabelFile, SubjectLabel, label
-from crosscheck.label.evidence import BUDGETS, RESULTS, SPREADS, Evidence, evidence, of_case, of_measured_set
+from crosscheck.label.evidence import BUDGETS, RESULTS, SPREADS, Exhibits, evidence, of_case, of_measured_set
 from crosscheck.label.factors import CRITERIA, FACTORS, HIGHEST, Factor
 from crosscheck.label.ladder import RULES, looked
 from crosscheck.library.find import load_case
@@ -289,7 +289,7 @@ def test_spreads_count_while_they_are_as_they_were_written(again: Path) -> None:
 def test_a_measured_set_is_labelled_by_its_budget(tmp_path: Path) -> None:
     folder = made(tmp_path / "set" if (tmp_path / "set").mkdir() is None else tmp_path, model=LINE + SLOPE)
 
-    def now() -> tuple[SubjectLabel, Evidence]:
+    def now() -> tuple[SubjectLabel, Exhibits]:
         subject = of_measured_set("set", "a set", folder)
         found = evidence(subject, tmp_path / "out")
         return label(subject, found), found
