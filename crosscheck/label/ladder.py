@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cache
 
 from crosscheck.judging.against_reference import REFERENCE
 from crosscheck.judging.outcome import FAULTS
@@ -15,6 +16,7 @@ from crosscheck.judging.unjudged import UNSAID
 from crosscheck.label.evidence import MEASURED, PROVENANCE, Exhibits, Labelled, Piece, SessionEvidence
 from crosscheck.label.factors import Factor
 from crosscheck.library.basis import Basis
+from crosscheck.library.find import shipped_names
 from crosscheck.sealed.document import SealedCase, SealedVerdict
 
 BY_PEOPLE = "no file shows it: an assessment by people who know the intended use"
@@ -203,10 +205,15 @@ RULES: dict[Factor, tuple[Rules, Pieces]] = {
 
 
 def _by(subject: Labelled, command: str, more: str = "") -> str:
-    """The command on a case; a measured set has no case yet."""
+    """The command on a case, which is known by its name or by its folder; a measured set has no case yet."""
     if subject.run is None:
         return f"a run.toml beside {MEASURED}, then crosscheck {command}{more}"
-    return f"crosscheck {command} {subject.name}{more}"
+    return f"crosscheck {command} {subject.name if subject.name in _shipped() else 'FOLDER'}{more}"
+
+
+@cache
+def _shipped() -> tuple[str, ...]:
+    return shipped_names()
 
 
 def _validate(subject: Labelled, more: str = " --out OUT") -> str:
