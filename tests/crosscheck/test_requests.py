@@ -51,6 +51,7 @@ UNKNOWN: dict[tuple[str, ...], tuple[str, str]] = {
     ("invariance", "CASE", "-e"): ("natve", NATIVE),
     ("stability", "MAP"): ("vibrating_hinje", 'did you mean "vibrating_hinge"?'),
     ("sensitivity", "CASE"): ("compund", 'did you mean "compound"?'),
+    ("label", "CASE"): ("compund", 'did you mean "compound"?'),
     ("validate", "SET"): ("yoyo_dispin", 'did you mean "yoyo_despin"?'),
 }
 """For every way to name an engine, a case, a variant or a map: a word that is none, and what is suggested."""
