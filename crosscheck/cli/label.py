@@ -64,7 +64,8 @@ def label(
         for name, each in labels.subjects.items():
             common.console.print(label_table(name, each, verbose))
     if out is not None:
-        write_label(labels, out)
+        with common.in_one_line():
+            write_label(labels, out)
         common.console.print(f"Label: {out}", soft_wrap=True, markup=False)
     if as_json:
         common.print_json(json.loads(label_text(labels)))
