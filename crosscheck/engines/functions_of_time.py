@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import cos, inf, nan, pi, sin
-from typing import NamedTuple, assert_never
+from typing import NamedTuple, Protocol, assert_never
 
 import numpy as np
 from msgspec import Struct
@@ -24,8 +24,20 @@ class Profile(NamedTuple):
     acceleration: float
 
 
-def profile(function: Function) -> Callable[[float], Profile]:
-    """The function as a callable t -> Profile. A table gives NaN outside its interval."""
+class Signals(Protocol):
+    """What controllers put out now."""
+
+    def value(self, source: str) -> float: ...
+
+
+def profile(function: Function, signals: Signals | None = None) -> Callable[[float], Profile]:
+    """The function as a callable t -> Profile. A table gives NaN outside its interval.
+
+    A signal has the value that it has in `signals` when it is asked for, and no rate; NotImplementedError without them.
+    """
+    if isinstance(function, ControlSignal) and signals is not None:
+        source, gain = function.source, function.gain
+        return lambda t: Profile(gain * signals.value(source), nan, nan)
     return _with_last_kept(_evaluated(function))
 
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from crosscheck.engines.connections import Along, Exerted, Moving, along_hinges, connections
 from crosscheck.engines.conventions import Frame, rotation_vector
-from crosscheck.engines.functions_of_time import Profile, profile
+from crosscheck.engines.functions_of_time import Profile, Signals, profile
 from crosscheck.engines.links import Attachment, Ball, Floating, Freedom, Link, Scalar, attachment
 from flexmb.scene.schema import Load, Scene
 from flexmb.scene.tree import coupled
@@ -54,9 +54,10 @@ def scalars(slots: Sequence[AnySlot]) -> list[AnySlot]:
     return [slot for slot in slots if isinstance(slot.freedom, Scalar)]
 
 
-def motors(slots: Sequence[Slot]) -> list[tuple[int, Callable[[float], Profile]]]:
+def motors(slots: Sequence[Slot], signals: Signals | None = None) -> list[tuple[int, Callable[[float], Profile]]]:
     """The place in `v` of every coordinate with a motor, and the load of that as a function of time."""
-    return [(slot.v, profile(slot.freedom.effort)) for slot in scalars(slots) if slot.freedom.effort is not None]
+    moved = [slot for slot in scalars(slots) if slot.freedom.effort is not None]
+    return [(slot.v, profile(slot.freedom.effort, signals)) for slot in moved]
 
 
 def scalar_start(freedom: Scalar) -> tuple[float, float]:
@@ -168,7 +169,10 @@ class FreeCoordinates(Generic[AnySlot]):
 class JointForces:
     """Generalised forces (nv,) of springs, of dampers and of motors; `quaternion` makes a peer's scalar first."""
 
-    def __init__(self, slots: Sequence[Slot], nv: int, quaternion: Callable[[Real], Real] = as_it_is) -> None:
+    def __init__(
+        self, slots: Sequence[Slot], nv: int, quaternion: Callable[[Real], Real] = as_it_is,
+        signals: Signals | None = None,
+    ) -> None:  # fmt: skip
         single = scalars(slots)
         sprung = [slot for slot in single if slot.freedom.stiffness]
         damped = [slot for slot in single if slot.freedom.damping]
@@ -178,7 +182,7 @@ class JointForces:
         self._rest = np.array([slot.freedom.rest for slot in sprung])
         self._damper_v = places([slot.v for slot in damped])
         self._damping = np.array([slot.freedom.damping for slot in damped])
-        self._motors = motors(slots)
+        self._motors = motors(slots, signals)
         self._balls = [
             slot
             for slot in slots
@@ -261,21 +265,23 @@ def placed_couplings(scene: Scene, slots: Sequence[Slot]) -> tuple[PlacedCouplin
     return tuple(placed)
 
 
-def placed_loads(scene: Scene, links: tuple[Link, ...]) -> list[tuple[int, PointLoad]]:
+def placed_loads(
+    scene: Scene, links: tuple[Link, ...], signals: Signals | None = None
+) -> list[tuple[int, PointLoad]]:
     """The loads at nodes, each with the number of its link, in whose axes they are."""
     at = [attachment(scene, links, load) for load in scene.loads]
-    return [(there.link, PointLoad(load, there.frame)) for there, load in zip(at, scene.loads, strict=True)]
+    return [(there.link, PointLoad(load, there.frame, signals)) for there, load in zip(at, scene.loads, strict=True)]
 
 
 class PointLoad:
     """A force or torque at a `point` (3,) of a body; `at` is the load's frame in the axes that the engine uses."""
 
-    def __init__(self, load: Load, at: Frame) -> None:
+    def __init__(self, load: Load, at: Frame, signals: Signals | None = None) -> None:
         self.point, self.is_force = at.position, load.type == "force"
         self.fixed_in_world = load.frame == "world"
         direction = np.array(load.direction, dtype=float)
         self._direction = direction if self.fixed_in_world else at.rotation @ direction
-        self._size = profile(load.function)
+        self._size = profile(load.function, signals)
 
     def vector(self, t: float) -> Real:
         """The load (3,) in the axes in which it is fixed: those of World or of the body."""
@@ -330,7 +336,7 @@ def by_joint(slots: Iterable[Slot], loads: Iterable[float]) -> dict[str, Real]:
 
 
 def of_kind(kind: str, wrenches: dict[tuple[str, str], Real]) -> dict[str, Real]:
-    """The wrenches of one kind of link, "body" or "wheel", by the name of their joint."""
+    """The wrenches of one kind of link, "body", "wheel" or "point mass", by the name of their joint."""
     return {name: wrench for (kind_of_wrench, name), wrench in wrenches.items() if kind_of_wrench == kind}
 
 

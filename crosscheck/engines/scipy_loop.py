@@ -25,6 +25,11 @@ _ATOL_RATIO = 1e-3
 _LEAST_ATOL = 1e-13
 
 
+def absolute_tolerance(rtol: float) -> float:
+    """What goes with a relative tolerance."""
+    return max(_ATOL_RATIO * rtol, _LEAST_ATOL)
+
+
 RTOL_LADDER = tuple(Effort("tolerance", rtol, "DOP853") for rtol in (1e-6, 1e-8, 1e-10, 1e-12))
 
 
@@ -102,7 +107,7 @@ def integrate(
         solved = solve_ivp(
             lambda t, y, last=before_end: rate(min(t, last), y),
             (begin, end), y, method=effort.method, t_eval=np.union1d(inside, [end]),
-            rtol=effort.value, atol=max(_ATOL_RATIO * effort.value, _LEAST_ATOL),
+            rtol=effort.value, atol=absolute_tolerance(effort.value),
         )  # fmt: skip
         evaluations += solved.nfev
         good = np.isfinite(solved.y).all(axis=0)

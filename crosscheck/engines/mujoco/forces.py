@@ -12,7 +12,7 @@ import numpy as np
 
 from crosscheck.engines.connections import WORLD, Along, Exerted, Moving
 from crosscheck.engines.conventions import cross
-from crosscheck.engines.functions_of_time import profile
+from crosscheck.engines.functions_of_time import Signals, profile
 from crosscheck.engines.links import Attachment
 from crosscheck.engines.mujoco.tree import ARMATURE, MujocoSlot, MujocoTree
 from crosscheck.engines.rigid_tree import JointForces, PointLoad, TreeConnectors, motors, placed_loads
@@ -24,16 +24,18 @@ class Forces:
     """Writes applied forces into `data` at every stage of a step, through MuJoCo's control callback.
 
     The callback is global to the process: `active` sets it and always takes it away again. `before_end` (s) caps the
-    time seen by the functions, so that the last stage before a jump sees the limit from the left.
+    time seen by the functions, so that the last stage before a jump sees the limit from the left. `signals` are those
+    of the scene's controllers, which act in motors and loads.
     """
 
-    def __init__(self, tree: MujocoTree, scene: Scene) -> None:
+    def __init__(self, tree: MujocoTree, scene: Scene, signals: Signals | None = None) -> None:
         self.driven: list[MujocoSlot] = [slot for slot in tree.slots if slot.driven]
         self._motions = [(slot.q, slot.v, profile(slot.freedom.prescribed)) for slot in self.driven]
-        self._motors = motors(tree.slots)
+        self._motors = motors(tree.slots, signals)
         self._pushed: tuple[float, list[tuple[int, float]]] = np.nan, []  # the last result of `_pushes`, with its time
-        self._loads = [_BodyWrench(tree, link, load) for link, load in placed_loads(scene, tree.links)]
-        self.spring_energy = JointForces(tree.slots, tree.model.nv, _unit).spring_energy
+        self._follows_time = signals is None  # alone
+        self._loads = [_BodyWrench(tree, link, load) for link, load in placed_loads(scene, tree.links, signals)]
+        self.spring_energy = JointForces(tree.slots, tree.model.nv, _unit, signals).spring_energy
         self.connections = MujocoConnections(tree, scene)
         self._connected = bool(self.connections)
         self.before_end = np.inf
@@ -72,7 +74,7 @@ class Forces:
 
         The last result is kept, since stages of a step share their times.
         """
-        if t != self._pushed[0]:
+        if t != self._pushed[0] or not self._follows_time:
             efforts = [(index, motor(t).value) for index, motor in self._motors]
             following = [(v, ARMATURE * motion(t).acceleration) for _, v, motion in self._motions]
             self._pushed = t, efforts + following

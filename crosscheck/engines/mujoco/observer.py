@@ -49,7 +49,7 @@ class MujocoObserver:
         connected = connector_outputs(connections.exerted(data.time, data), connections.along(data.time, data))
         return Snapshot(
             markers={name: self._marker(at, data) for name, at in self._markers.items()},
-            loads=of_kind("body", loads) | self._closed(data),
+            loads=of_kind("body", loads) | of_kind("point mass", loads) | self._closed(data),
             wheel_loads=of_kind("wheel", loads),
             drives=self._drives(data, loads),
             energy={

@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from crosscheck.engines.conventions import quaternion_rate, scalar_first, scalar_last
+from crosscheck.engines.functions_of_time import Signals
 from crosscheck.engines.links import Ball, Floating, Scalar
 from crosscheck.engines.pinocchio.closures import PinocchioClosures, of_its_own
 from crosscheck.engines.pinocchio.forces import PinocchioConnections, PlacedLoads
@@ -43,11 +44,13 @@ class Acting(NamedTuple):
 
 
 class Dynamics:
-    def __init__(self, tree: PinocchioTree, scene: Scene) -> None:
+    """`signals` are those of the scene's controllers, which act in motors and loads."""
+
+    def __init__(self, tree: PinocchioTree, scene: Scene, signals: Signals | None = None) -> None:
         self.tree = tree
         self.data = tree.model.createData()
-        self.forces = JointForces(tree.slots, tree.model.nv, scalar_first)
-        self.loads = PlacedLoads(tree, scene)
+        self.forces = JointForces(tree.slots, tree.model.nv, scalar_first, signals)
+        self.loads = PlacedLoads(tree, scene, signals)
         self.connections = PinocchioConnections(tree, scene)
         self._coordinates = FreeCoordinates(tree.slots, tree.model.nq, tree.model.nv)
         self.driven: list[PinocchioSlot] = self._coordinates.driven
@@ -63,8 +66,17 @@ class Dynamics:
     def initial(self) -> Real:
         return self._coordinates.packed(*initial_state(self.tree))
 
+    def packed(self, q: Real, v: Real) -> Real:
+        """y of a state of all coordinates, before any work was done."""
+        return self._coordinates.packed(q, v)
+
     def state(self, t: float, y: Real) -> TreeState:
         return self._coordinates.state(t, y)
+
+    def masses(self, q: Real) -> Real:
+        """The mass matrix (nv, nv), with armatures and without ballast."""
+        upper = np.triu(pin.crba(self.tree.model, self._ballasted_data, q))
+        return np.asarray(upper + np.triu(upper, 1).T)
 
     def solve(self, t: float, state: TreeState) -> PinocchioSolution:
         """Articulated-body accelerations, or constrained ones where loops are closed, and drive loads.

@@ -6,6 +6,7 @@ from typing import get_args
 
 from crosscheck.engines.connections import KNOWN
 from crosscheck.engines.contract import Effort, EngineMissing, Model
+from crosscheck.engines.hybrid.refusals import refusal
 from crosscheck.engines.links import obstacle
 from crosscheck.engines.peer import PeerEngine
 from crosscheck.engines.scipy_loop import RTOL_LADDER
@@ -20,13 +21,14 @@ class PinocchioEngine(PeerEngine):
     """Rigid trees, exact: articulated-body accelerations, hybrid dynamics where coordinates are prescribed."""
 
     name = "pinocchio"
-    takes = ("connectors", "couplings", "t_start")
+    takes = ("connectors", "couplings", "controllers", "events", "t_start")
     summary = "rigid trees in minimal coordinates"
     algorithm = "articulated bodies, O(N)"
     settings = (
         "Its articulated-body algorithm, or its proximal constrained dynamics for closed loops, compiled and called "
         "from Python. It has no integrator: SciPy's DOP853 steps it, in Python, so that on small scenes most of the "
-        "time is SciPy's and Python's. No contacts. Outputs are computed after the timed solve."
+        "time is SciPy's and Python's; events and controllers are in a loop in Python around it. No contacts. Outputs "
+        "are computed after the timed solve."
     )
 
     def version(self) -> str:
@@ -40,7 +42,7 @@ class PinocchioEngine(PeerEngine):
         if len(scene.hinges) > MOST_JOINTS:
             return f"{len(scene.hinges)} hinges are too many: {WHY_NOT_MORE}"
         offers = {"screws": True, "couplings": True, "armatures": True}
-        return obstacle(scene, "Pinocchio", get_args(ClosureKind), KNOWN, **offers)
+        return obstacle(scene, "Pinocchio", get_args(ClosureKind), KNOWN, **offers) or refusal(scene)
 
     def efforts(self, scene: Scene) -> tuple[Effort, ...]:
         return RTOL_LADDER

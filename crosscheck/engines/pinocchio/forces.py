@@ -11,6 +11,7 @@ import pinocchio as pin
 
 from crosscheck.engines.connections import WORLD, Along, Exerted, Moving
 from crosscheck.engines.conventions import cross, shift_wrench
+from crosscheck.engines.functions_of_time import Signals
 from crosscheck.engines.links import Attachment
 from crosscheck.engines.pinocchio.tree import PinocchioTree
 from crosscheck.engines.rigid_tree import PointLoad, TreeConnectors, placed_loads
@@ -21,8 +22,9 @@ from flexmb.typing import Real
 class PlacedLoads:
     """Loads at nodes as wrenches on the joints, in joint axes; needs the kinematics of `data` to be up to date."""
 
-    def __init__(self, tree: PinocchioTree, scene: Scene) -> None:
-        self._loads = [_JointWrench(tree.joints[link], load) for link, load in placed_loads(scene, tree.links)]
+    def __init__(self, tree: PinocchioTree, scene: Scene, signals: Signals | None = None) -> None:
+        placed = placed_loads(scene, tree.links, signals)
+        self._loads = [_JointWrench(tree.joints[link], load) for link, load in placed]
         self._none = pin.StdVec_Force()
         self._none.extend([pin.Force.Zero() for _ in range(tree.model.njoints)])
 

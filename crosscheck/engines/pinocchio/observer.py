@@ -51,7 +51,7 @@ class PinocchioObserver:
         linear, about_com, com = data.hg.linear, data.hg.angular, data.com[0]
         return Snapshot(
             markers=markers,
-            loads=of_kind("body", wrench) | closed | dynamics.rows.loads(data),
+            loads=of_kind("body", wrench) | of_kind("point mass", wrench) | closed | dynamics.rows.loads(data),
             wheel_loads=of_kind("wheel", wrench),
             drives=self._drives(drive),
             energy={
