@@ -34,6 +34,7 @@ BUILT_IN = {
     "basilisk": "crosscheck.engines.basilisk:BasiliskEngine",
     "opensim": "crosscheck.engines.opensim:OpensimEngine",
     "kratos": "crosscheck.engines.kratos:KratosEngine",
+    "kane": "crosscheck.engines.kane:KaneEngine",
 }
 OWN_CODE = tuple(name for name, place in BUILT_IN.items() if place.startswith("crosscheck.engines.native:"))
 # For each engine the one whose library or compiled code it shares: both run in the same worker process.

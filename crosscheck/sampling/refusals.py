@@ -30,6 +30,7 @@ BESIDE = {
     "dart": SCIPY,
     "basilisk": SCIPY,
     "opensim": SCIPY,
+    "kane": SCIPY,
     "mujoco": ("RK4", "Euler", "implicit", "implicitfast"),
     "exudyn": (
         "TrapezoidalIndex2", "GeneralizedAlpha", "ExplicitEuler", "ExplicitMidpoint", "RK33", "RK44", "RK67", "ODE23",

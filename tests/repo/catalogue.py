@@ -10,6 +10,7 @@ from crosscheck.export.metadata import cite
 from crosscheck.library.basis import basis
 from crosscheck.library.find import Case, shipped_cases
 from crosscheck.library.reference import has_reference, load_reference
+from tests.repo.holders import words
 from tests.repo.project import ROOT
 
 PAGE = ROOT / "docs" / "cases.md"
@@ -26,6 +27,8 @@ Every case with what anchors it. This page is generated from the folders in `cas
 
 *Rests on* is read from the stored routes: the closed form and the codes that agree, or native alone with its
 formulations.
+*Held* says for every channel that native gives in a variant which other codes agree with it, by the accepted figures
+and the routes of the reference; a number is that of the channels of a kind.
 *Known to* is the least and the largest uncertainty of the stored numbers, relative to each channel's range.
 
 The data are licensed under CC BY 4.0 (`cases/LICENSE`); *Cite* is how a case is cited. `crosscheck export
@@ -82,6 +85,8 @@ def _section(case: Case) -> Iterator[str]:
     yield f"**{case.run.title}.** Tags: {', '.join(case.run.tags) or 'none'}. Known: {case.provenance.uncertainty}.\n"
     yield f"{text.strip()}\n"
     yield f"Rests on: {_basis(case)}. Sources: {'; '.join(case.provenance.sources)}\n"
+    if held := "\n".join(words(case)):
+        yield f"Held, by variant:\n\n{held}\n"
     yield f"Cite: {cite(case)}\n"
 
 

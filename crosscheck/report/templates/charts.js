@@ -6,7 +6,7 @@
 const COLOURS = { native: "#0072b2", "native-composite": "#6a63c8", "native-frisch": "#3a9adb", "native-frisch-as-printed": "#7c8794",
   "native-radau5": "#2d64b0", "native-exponential": "#4b8fc0", "native-generalised-alpha": "#1f86a8",
   pinocchio: "#d55e00", mujoco: "#009e73", exudyn: "#c28800", "exudyn-beam": "#b8609a", drake: "#995133", dart: "#6a7f00", basilisk: "#ab3d62", opensim: "#8a6d1f",
-  kratos: "#5b6bb5" };
+  kratos: "#5b6bb5", kane: "#3d7a6a" };
 const SHIPPED = Object.keys(COLOURS).length;
 const SPARE = ["#0f8b8d", "#a74b40", "#5d6877", "#b917a1", "#497215"];
 const SYMBOLS = ["circle", "square", "diamond", "triangle-up", "triangle-down", "cross", "star", "hexagon"];
