@@ -38,7 +38,7 @@ _DIRECTIONS = (
 )
 
 
-class Deflections(NamedTuple):
+class AxisDeflections(NamedTuple):
     """Translation and rotation (n, 3, m) of places on the axis."""
 
     translation: Real
@@ -85,7 +85,7 @@ class BendingBeam:
         N = np.concatenate([position[:, :, None], shapes], axis=2).reshape(len(self._x), -1)
         return self._integral(np.column_stack([np.full(len(self._x), one), N]), key)
 
-    def deflections(self, x: Real) -> Deflections:
+    def deflections(self, x: Real) -> AxisDeflections:
         """At places x (n,) m along the axis."""
         translation, rotation = np.zeros((2, len(x), 3, len(self.stiffness)))
         first = 0
@@ -93,7 +93,7 @@ class BendingBeam:
             own = slice(first, first := first + columns.shape[1])
             translation[:, way.along, own] = self._integrated(x, 2) @ columns
             rotation[:, way.about, own] = way.sign * self._integrated(x, 1) @ columns
-        return Deflections(translation, rotation)
+        return AxisDeflections(translation, rotation)
 
     def _integrated(self, x: Real, times: int) -> Real:
         """(n, POLYNOMIALS): curvatures, slopes or deflections of the polynomials, which vanish at the root."""

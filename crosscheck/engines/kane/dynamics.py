@@ -16,8 +16,8 @@ import numpy as np
 
 from crosscheck.engines.conventions import rotation_matrix
 from crosscheck.engines.kane.bodies import body_data, wheel_data
-from crosscheck.engines.kane.frames import Bodies, Frames, Motion, Place, applied, skew
-from crosscheck.engines.kane.joints import Flight, Joint, all_joints, motor, springs
+from crosscheck.engines.kane.frames import BodyFrames, FramePlace, FreeBodies, MovedFrames, applied, skew
+from crosscheck.engines.kane.joints import KaneFlight, KaneJoint, all_joints, motor, springs
 from crosscheck.engines.kane.moments import tensors, with_modes
 from crosscheck.engines.kane.start import start
 from flexmb.scene.schema import Marker, Scene
@@ -46,17 +46,17 @@ def _fill_quaternion_maps() -> None:
 _fill_quaternion_maps()
 
 
-class State(NamedTuple):
+class KaneState(NamedTuple):
     """All bodies at a time, and the angles of joints whose coordinates are unknown."""
 
     t: float
-    bodies: Bodies
+    bodies: FreeBodies
     quaternion: Real
     angle: Real
     raw: Real
 
 
-class Solution(NamedTuple):
+class KaneSolution(NamedTuple):
     """Accelerations (b, 6+m), loads (j, 6) [torque; force] of joints on the outboard body about its frame, World axes;
     drive loads (j,), rates of angles (j,), power (W) of all but springs and gravity, and the frames of the joints."""
 
@@ -65,7 +65,7 @@ class Solution(NamedTuple):
     drive: Real
     rate: Real
     power: float
-    joints: Motion
+    joints: MovedFrames
 
 
 class KaneDynamics:
@@ -75,12 +75,12 @@ class KaneDynamics:
         self.scene, self.data = scene, data
         self.numbers = {name: k for k, name in enumerate(data)} | {GROUND: len(data)}
         everything = all_joints(scene, self.numbers, data)
-        self.flights = [each for each in everything if isinstance(each, Flight)]
-        self.joints = [each for each in everything if isinstance(each, Joint)]
+        self.flights = [each for each in everything if isinstance(each, KaneFlight)]
+        self.joints = [each for each in everything if isinstance(each, KaneJoint)]
         self.count, self.modes = len(data), max((len(each.stiffness) for each in data.values()), default=0)
         self._set_bodies()
         self._set_joints()
-        self.markers = Frames([self._marker(marker) for marker in scene.markers], self.modes)
+        self.markers = BodyFrames([self._marker(marker) for marker in scene.markers], self.modes)
 
     def _set_bodies(self) -> None:
         b, m = self.count, self.modes
@@ -97,7 +97,7 @@ class KaneDynamics:
 
     def _set_joints(self) -> None:
         joints = self.joints
-        self._frames = Frames([*(j.inboard for j in joints), *(j.outboard for j in joints)], self.modes)
+        self._frames = BodyFrames([*(j.inboard for j in joints), *(j.outboard for j in joints)], self.modes)
         self._inboard = np.array([j.inboard.body for j in joints], dtype=np.intp)
         self._outboard = np.array([j.outboard.body for j in joints], dtype=np.intp)
         self._each = np.arange(len(joints))
@@ -112,9 +112,9 @@ class KaneDynamics:
         ]
         self._rows = np.zeros((len(joints), 6, self.count + 1, 6 + self.modes))
 
-    def _marker(self, marker: Marker) -> Place:
+    def _marker(self, marker: Marker) -> FramePlace:
         node = self.data[marker.body].nodes[marker.node]
-        return Place(self.numbers[marker.body], node, np.array(marker.offset_m), np.eye(3))
+        return FramePlace(self.numbers[marker.body], node, np.array(marker.offset_m), np.eye(3))
 
     def initial(self) -> Real:
         bodies, quaternion = start(self.scene, [*self.joints, *self.flights], self.numbers, self.data, self.modes)
@@ -124,7 +124,7 @@ class KaneDynamics:
         angles = [each.start[0] for each in self.joints]
         return np.concatenate([per_body.ravel(), angles, [0.0]])
 
-    def state(self, t: float, y: Real) -> State:
+    def state(self, t: float, y: Real) -> KaneState:
         b, m = self.count, self.modes
         table = np.zeros((b + 1, 13 + 2 * m))  # the ground stands last, at rest
         table[:b] = y[: b * (13 + 2 * m)].reshape(b, -1)
@@ -133,10 +133,10 @@ class KaneDynamics:
         unit = q / np.sqrt((q * q).sum(1))[:, None]
         R = ((unit[:, :, None] * unit[:, None]).reshape(-1, 16) @ _ROTATION).reshape(-1, 3, 3)
         velocity, angular = table[:, 7 + m : 10 + m], table[:, 10 + m : 13 + m]
-        bodies = Bodies(table[:, :3], R, velocity, angular, table[:, 7 : 7 + m], table[:, 13 + m :])
-        return State(t, bodies, q, y[b * (13 + 2 * m) : -1], table)
+        bodies = FreeBodies(table[:, :3], R, velocity, angular, table[:, 7 : 7 + m], table[:, 13 + m :])
+        return KaneState(t, bodies, q, y[b * (13 + 2 * m) : -1], table)
 
-    def mass_matrix(self, bodies: Bodies) -> Real:
+    def mass_matrix(self, bodies: FreeBodies) -> Real:
         """(b, 6+m, 6+m), with ones for modes that a body does not have."""
         b, m = self.count, self.modes
         z = np.ones((b, m + 1))
@@ -146,7 +146,7 @@ class KaneDynamics:
         M[:, 6:, 6:] += self._unused
         return M
 
-    def _inertia_forces(self, bodies: Bodies) -> Real:
+    def _inertia_forces(self, bodies: FreeBodies) -> Real:
         """(b, 6+m): of velocities and gravity, and of stiffness and damping."""
         b, m = self.count, self.modes
         z, zdot = np.ones((b, m + 1)), np.zeros((b, m + 1))
@@ -160,7 +160,7 @@ class KaneDynamics:
         h[:, 6:] += applied(self.stiffness, bodies.eta[:b]) + applied(self.damping, bodies.rate[:b])
         return h
 
-    def solve(self, state: State) -> Solution:
+    def solve(self, state: KaneState) -> KaneSolution:
         bodies, n, count = state.bodies, 6 + self.modes, self.count
         M, h = self.mass_matrix(bodies), self._inertia_forces(bodies)
         at, joints = self._frames.at(bodies), len(self.joints)
@@ -195,9 +195,9 @@ class KaneDynamics:
         elastic = self._spring_torque(state, prescribed)
         lost = applied(self.damping, bodies.rate[:count])
         power = float((drive + torque - elastic) @ rate - np.sum(lost * bodies.rate[:count]))
-        return Solution(acceleration, load, drive, rate, power, at)
+        return KaneSolution(acceleration, load, drive, rate, power, at)
 
-    def _targets(self, at: Motion, in_axes: Real, prescribed: Real) -> tuple[Real, Real]:
+    def _targets(self, at: MovedFrames, in_axes: Real, prescribed: Real) -> tuple[Real, Real]:
         """What J a has to be (j, 6), in axes of the joint for turns and in World axes, and the rates of angles (j,)."""
         joints = len(self.joints)
         moving = at.velocity[joints:] - at.velocity[:joints]
@@ -225,22 +225,22 @@ class KaneDynamics:
         target[:, _TURNS:] -= 2.0 * CLOSING * moving[:, _TURNS:]
         return target, rate
 
-    def angles(self, state: State, prescribed: Real) -> Real:
+    def angles(self, state: KaneState, prescribed: Real) -> Real:
         """(j,) of all joints."""
         return np.where(self._free, state.angle, prescribed[:, 0])
 
-    def _spring_torque(self, state: State, prescribed: Real) -> Real:
+    def _spring_torque(self, state: KaneState, prescribed: Real) -> Real:
         k, _, rest = self._springs
         return np.asarray(-k * (self.angles(state, prescribed) - rest))
 
-    def _torques(self, state: State, prescribed: Real, rate: Real) -> Real:
+    def _torques(self, state: KaneState, prescribed: Real, rate: Real) -> Real:
         """(j,): of springs, dampers and motors on the outboard body about z."""
         torque = self._spring_torque(state, prescribed) - self._springs[1] * rate
         for k, size in self._motors:
             torque[k] += size(state.t)
         return torque
 
-    def spring_energy(self, state: State) -> float:
+    def spring_energy(self, state: KaneState) -> float:
         """J."""
         prescribed = np.zeros((len(self.joints), 3))
         for k, motion in self._motions:

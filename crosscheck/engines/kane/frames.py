@@ -56,7 +56,7 @@ def _functions(s: Real) -> Real:
     return np.where(s[:, None] <= 1.0, small, large)
 
 
-class Node(NamedTuple):
+class ShapedNode(NamedTuple):
     """Rest position (3,) m and axes (3, 3), node to body, translation and rotation shapes (3, m)."""
 
     position: Real
@@ -66,16 +66,16 @@ class Node(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Place:
+class FramePlace:
     """A frame at an offset from a node of a body: `arm` (3,) m and `axes` (3, 3) in node axes."""
 
     body: int
-    node: Node
+    node: ShapedNode
     arm: Real
     axes: Real
 
 
-class Bodies(NamedTuple):
+class FreeBodies(NamedTuple):
     """Of b bodies: origins (b, 3), R (b, 3, 3) body to World, velocities of origins (b, 3) in World axes, angular
     velocities (b, 3) in body axes, modal coordinates and rates (b, m)."""
 
@@ -87,7 +87,7 @@ class Bodies(NamedTuple):
     rate: Real
 
 
-class Motion(NamedTuple):
+class MovedFrames(NamedTuple):
     """Of f frames in World axes: positions (f, 3), axes (f, 3, 3), velocities (f, 6) [angular; linear], partial
     velocities (f, 6, 6+m) by a body's coordinates, and the accelerations (f, 6) that these leave."""
 
@@ -98,10 +98,10 @@ class Motion(NamedTuple):
     remaining: Real
 
 
-class Frames:
+class BodyFrames:
     """Frames on bodies, all at once; each with as many modes as the body that has most."""
 
-    def __init__(self, places: Sequence[Place], modes: int) -> None:
+    def __init__(self, places: Sequence[FramePlace], modes: int) -> None:
         nodes, none = [place.node for place in places], [np.zeros((0, 3))]
         self._body = np.array([place.body for place in places], dtype=np.intp)
         self._rest = np.concatenate([none[0], *(node.position[None] for node in nodes)])
@@ -114,14 +114,14 @@ class Frames:
         self._deform = bool(shapes.any())
         self._still = self._rest + self._arm
 
-    def at(self, bodies: Bodies) -> Motion:
+    def at(self, bodies: FreeBodies) -> MovedFrames:
         """Their motion. With w the body's angular velocity, W etadot that of the node in it, and d the arm:
 
         velocity w x rho + phi etadot + (W etadot) x d beyond the origin's, W = J_l(theta) psi.
         """
         return self._on_deforming_nodes(bodies) if self._deform else self._on_rigid_nodes(bodies)
 
-    def _on_rigid_nodes(self, bodies: Bodies) -> Motion:
+    def _on_rigid_nodes(self, bodies: FreeBodies) -> MovedFrames:
         own, rho = self._body, self._still
         R, w_ = bodies.rotation[own], skew(bodies.angular[own])
         moving = applied(w_, rho)
@@ -132,9 +132,9 @@ class Frames:
         velocity[:, :3] = applied(R, bodies.angular[own])
         velocity[:, 3:] = bodies.velocity[own] + applied(R, moving)
         remaining[:, 3:] = applied(R, applied(w_, moving))
-        return Motion(bodies.position[own] + applied(R, rho), R @ self._axes, velocity, partial, remaining)
+        return MovedFrames(bodies.position[own] + applied(R, rho), R @ self._axes, velocity, partial, remaining)
 
-    def _on_deforming_nodes(self, bodies: Bodies) -> Motion:
+    def _on_deforming_nodes(self, bodies: FreeBodies) -> MovedFrames:
         own = self._body
         R, w, eta, rate = bodies.rotation[own], bodies.angular[own], bodies.eta[own], bodies.rate[own]
         theta, turning = applied(self._rotation, eta), applied(self._rotation, rate)
@@ -162,7 +162,7 @@ class Frames:
         linear = bodies.velocity[own] + applied(R, applied(w_, rho) + moving)
         left_angular = applied(R, changing + applied(w_, spin))
         left = applied(w_, applied(w_, rho) + 2.0 * moving) - applied(d_, changing) + applied(spin_, applied(spin_, d))
-        return Motion(
+        return MovedFrames(
             bodies.position[own] + applied(R, rho), R @ exponential @ self._axes,
             np.concatenate([angular, linear], axis=1), partial,
             np.concatenate([left_angular, applied(R, left)], axis=1),

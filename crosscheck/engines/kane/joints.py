@@ -4,29 +4,42 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import assert_never
 
 import numpy as np
 
 from crosscheck.engines.conventions import rotation_matrix
 from crosscheck.engines.functions_of_time import Profile, profile
-from crosscheck.engines.kane.bodies import BodyData, about_z
-from crosscheck.engines.kane.frames import Node, Place
+from crosscheck.engines.kane.bodies import KaneBody, about_z
+from crosscheck.engines.kane.frames import FramePlace, ShapedNode
 from flexmb.scene.freedoms import AngularCoordinate, ScalarFreedom
-from flexmb.scene.hinges import Free, Hinge, Revolute, Weld
+from flexmb.scene.hinges import (
+    Cylindrical,
+    Free,
+    Gimbal,
+    Hinge,
+    Planar,
+    Prismatic,
+    Revolute,
+    Screw,
+    Spherical,
+    Universal,
+    Weld,
+)
 from flexmb.scene.schema import Scene, Wheel
 from flexmb.scene.tree import GROUND
 from flexmb.typing import Real
 
-_GROUND = Node(np.zeros(3), np.eye(3), np.zeros((3, 0)), np.zeros((3, 0)))
+_GROUND = ShapedNode(np.zeros(3), np.eye(3), np.zeros((3, 0)), np.zeros((3, 0)))
 
 
 @dataclass(frozen=True)
-class Joint:
+class KaneJoint:
     """A weld, or a turn about the common z axis of both frames with a `coordinate`; `of` is its hinge or wheel."""
 
     of: Hinge | Wheel
-    inboard: Place
-    outboard: Place
+    inboard: FramePlace
+    outboard: FramePlace
     coordinate: AngularCoordinate | None
 
     @property
@@ -50,46 +63,52 @@ class Joint:
 
 
 @dataclass(frozen=True)
-class Flight:
+class KaneFlight:
     """A hinge that holds nothing; its frames are those of the scene."""
 
     of: Free
-    inboard: Place
-    outboard: Place
+    inboard: FramePlace
+    outboard: FramePlace
 
 
-def joint(hinge: Hinge, numbers: dict[str, int], data: dict[str, BodyData]) -> Joint | Flight:
+def joint(hinge: Hinge, numbers: dict[str, int], data: dict[str, KaneBody]) -> KaneJoint | KaneFlight:
     """Of a hinge of the kinds that the engine has; TypeError for another."""
     parent = _GROUND if hinge.parent == GROUND else data[hinge.parent].nodes[hinge.parent_node]
     child = data[hinge.child].nodes[hinge.child_node]
-    coordinate, turn = None, np.eye(3)
+    coordinate, turn, flies = None, np.eye(3), None
     match hinge:
-        case Weld() | Free():
+        case Weld():
             pass
+        case Free():
+            flies = hinge
         case Revolute():
             coordinate, turn = hinge.rotation, about_z(np.array(hinge.axis))
-        case _:
+        case Prismatic() | Cylindrical() | Universal() | Gimbal() | Spherical() | Planar() | Screw():
             raise TypeError(f'hinge "{hinge.name}" is of a kind that the engine refuses')
-    inboard = Place(
+        case _:
+            assert_never(hinge)
+    inboard = FramePlace(
         numbers[hinge.parent],
         parent,
         np.array(hinge.parent_position_m),
         rotation_matrix(hinge.parent_quaternion) @ turn,
     )
-    outboard = Place(
+    outboard = FramePlace(
         numbers[hinge.child], child, np.array(hinge.child_position_m), rotation_matrix(hinge.child_quaternion) @ turn
     )
-    return Flight(hinge, inboard, outboard) if isinstance(hinge, Free) else Joint(hinge, inboard, outboard, coordinate)
+    if flies is not None:
+        return KaneFlight(flies, inboard, outboard)
+    return KaneJoint(hinge, inboard, outboard, coordinate)
 
 
-def bearing(wheel: Wheel, numbers: dict[str, int], data: dict[str, BodyData]) -> Joint:
+def bearing(wheel: Wheel, numbers: dict[str, int], data: dict[str, KaneBody]) -> KaneJoint:
     """Of a wheel, whose body has its z axis along the spin."""
     (freedom,) = wheel.freedoms
     assert isinstance(freedom, ScalarFreedom) and isinstance(freedom.coordinate, AngularCoordinate)
     axes = about_z(np.array(wheel.axis))
-    inboard = Place(numbers[wheel.body], data[wheel.body].nodes[wheel.node], np.array(wheel.offset_m), axes)
-    outboard = Place(numbers[wheel.name], data[wheel.name].nodes["origin"], np.zeros(3), np.eye(3))
-    return Joint(wheel, inboard, outboard, freedom.coordinate)
+    inboard = FramePlace(numbers[wheel.body], data[wheel.body].nodes[wheel.node], np.array(wheel.offset_m), axes)
+    outboard = FramePlace(numbers[wheel.name], data[wheel.name].nodes["origin"], np.zeros(3), np.eye(3))
+    return KaneJoint(wheel, inboard, outboard, freedom.coordinate)
 
 
 def motor(coordinate: AngularCoordinate | None) -> Callable[[float], float]:
@@ -100,13 +119,13 @@ def motor(coordinate: AngularCoordinate | None) -> Callable[[float], float]:
     return lambda t: torque(t).value
 
 
-def springs(joints: list[Joint]) -> Real:
+def springs(joints: list[KaneJoint]) -> Real:
     """Stiffness, damping and angle at rest (3, j)."""
     given = [(0.0, 0.0, 0.0) if each.coordinate is None else each.coordinate.spring for each in joints]
     return np.array(given).reshape(-1, 3).T
 
 
-def all_joints(scene: Scene, numbers: dict[str, int], data: dict[str, BodyData]) -> list[Joint | Flight]:
+def all_joints(scene: Scene, numbers: dict[str, int], data: dict[str, KaneBody]) -> list[KaneJoint | KaneFlight]:
     """Hinges in the order of the scene, then wheels."""
-    hinges: list[Joint | Flight] = [joint(hinge, numbers, data) for hinge in scene.hinges]
+    hinges: list[KaneJoint | KaneFlight] = [joint(hinge, numbers, data) for hinge in scene.hinges]
     return [*hinges, *(bearing(wheel, numbers, data) for wheel in scene.wheels)]

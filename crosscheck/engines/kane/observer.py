@@ -6,7 +6,7 @@ import numpy as np
 
 from crosscheck.engines.contract import MarkerSnapshot, Snapshot
 from crosscheck.engines.conventions import cross, quaternion_of
-from crosscheck.engines.kane.dynamics import KaneDynamics, State
+from crosscheck.engines.kane.dynamics import KaneDynamics, KaneState
 from crosscheck.engines.kane.frames import applied
 from flexmb.scene.schema import Wheel
 from flexmb.typing import Real
@@ -19,7 +19,7 @@ class KaneObserver:
         self._dynamics = dynamics
         self._driven = [k for k, each in enumerate(dynamics.joints) if each.coordinate is not None and not each.free]
 
-    def observe(self, t: float, state: State) -> Snapshot:
+    def observe(self, t: float, state: KaneState) -> Snapshot:
         dynamics, bodies, b = self._dynamics, state.bodies, self._dynamics.count
         solution = dynamics.solve(state)
         R, eta = bodies.rotation[:b], bodies.eta[:b]
@@ -45,7 +45,7 @@ class KaneObserver:
             momentum=np.concatenate([(angular + cross(bodies.position[:b], linear)).sum(0), linear.sum(0)]),
         )
 
-    def _weight(self, state: State) -> float:
+    def _weight(self, state: KaneState) -> float:
         """Potential energy (J), zero at the World origin."""
         dynamics, bodies, b = self._dynamics, state.bodies, self._dynamics.count
         first = dynamics.moments[:, 0, 1:].reshape(b, 3, -1)  # sum m N
@@ -54,7 +54,7 @@ class KaneObserver:
         centre = mass * bodies.position[:b] + applied(bodies.rotation[:b], applied(first, z))
         return -float(centre.sum(0) @ np.array(dynamics.scene.gravity_m_s2))
 
-    def _markers(self, state: State, acceleration: Real) -> dict[str, MarkerSnapshot]:
+    def _markers(self, state: KaneState, acceleration: Real) -> dict[str, MarkerSnapshot]:
         dynamics = self._dynamics
         at = dynamics.markers.at(state.bodies)
         own = [dynamics.numbers[marker.body] for marker in dynamics.scene.markers]

@@ -7,20 +7,24 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from crosscheck.engines.conventions import axis_rotation, quaternion_of, rotation_matrix
-from crosscheck.engines.kane.bodies import BodyData
-from crosscheck.engines.kane.frames import Bodies, Frames, Place
-from crosscheck.engines.kane.joints import Flight, Joint
+from crosscheck.engines.kane.bodies import KaneBody
+from crosscheck.engines.kane.frames import BodyFrames, FramePlace, FreeBodies
+from crosscheck.engines.kane.joints import KaneFlight, KaneJoint
 from flexmb.scene.schema import Scene
 from flexmb.scene.tree import ordered
 from flexmb.typing import Real
 
 
 def start(
-    scene: Scene, held: Sequence[Joint | Flight], numbers: Mapping[str, int], data: Mapping[str, BodyData], modes: int
-) -> tuple[Bodies, Real]:
+    scene: Scene,
+    held: Sequence[KaneJoint | KaneFlight],
+    numbers: Mapping[str, int],
+    data: Mapping[str, KaneBody],
+    modes: int,
+) -> tuple[FreeBodies, Real]:
     """All bodies, wheels and the ground at t = 0, and their quaternions (b+1, 4)."""
     count = len(numbers)
-    bodies = Bodies(
+    bodies = FreeBodies(
         np.zeros((count, 3)), np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3)), np.zeros((count, 3)),
         np.zeros((count, modes)), np.zeros((count, modes)),
     )  # fmt: skip
@@ -35,11 +39,11 @@ def start(
     return bodies, np.array([quaternion_of(R) for R in bodies.rotation])
 
 
-def _place(bodies: Bodies, joint: Joint | Flight, modes: int) -> None:
+def _place(bodies: FreeBodies, joint: KaneJoint | KaneFlight, modes: int) -> None:
     """Put the outboard body where the joint holds it."""
-    at = Frames([joint.inboard], modes).at(bodies)
+    at = BodyFrames([joint.inboard], modes).at(bodies)
     position, axes, (w, v) = at.position[0], at.axes[0], at.velocity[0].reshape(2, 3)
-    if isinstance(joint, Flight):
+    if isinstance(joint, KaneFlight):
         own = joint.of
         arm, turn = axes @ np.array(own.position_m), axes @ rotation_matrix(own.quaternion)
         v = v + np.cross(w, arm) + turn @ np.array(own.velocity_m_s)
@@ -51,10 +55,10 @@ def _place(bodies: Bodies, joint: Joint | Flight, modes: int) -> None:
     _carry(bodies, joint.outboard, modes, position, axes, w, v)
 
 
-def _carry(bodies: Bodies, place: Place, modes: int, position: Real, axes: Real, w: Real, v: Real) -> None:
+def _carry(bodies: FreeBodies, place: FramePlace, modes: int, position: Real, axes: Real, w: Real, v: Real) -> None:
     """Move the body so that its frame has this position, these axes and velocities, World axes."""
     number = place.body
-    own = Frames([place], modes).at(bodies)  # the body is still at the origin, at rest
+    own = BodyFrames([place], modes).at(bodies)  # the body is still at the origin, at rest
     bodies.rotation[number] = axes @ own.axes[0].T
     R = bodies.rotation[number]
     bodies.position[number] = position - R @ own.position[0]
