@@ -292,6 +292,10 @@ def parameters(plant: Plant, names: Sequence[str]) -> Parameters:
 
 
 _OF_TABLES = {
+    "tree.body.point_start": (
+        "how many points of a beam of level \"exact\" its default is, or a part of the beam takes, depends on it; give the "
+        "beam `points`, or leave it whole by cuts = []"
+    ),
     "tree.body.planar": (
         'it bends a beam of level "exact", whose strains are in one plane, out of that plane; give the beam torsion '
         "and both curvatures, in `families` or `polynomials`"

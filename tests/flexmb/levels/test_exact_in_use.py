@@ -119,7 +119,7 @@ def test_derivatives_by_numbers_of_the_beam():
     """Of accelerations, against differences of recompiled systems over a millionth, as far as these round."""
     tensor = trees.matrix(np.diag([2e-2, 1e-2, 2e-2]))
     lump = s.TipMass(x_m=0.6, mass_kg=0.3, com_m=(0.02, 0.1, -0.05), inertia_kg_m2=tensor)
-    modes = s.Modes(count=2, families=SPACE, viscosity_s=0.01)
+    modes = s.Modes(count=2, families=SPACE, viscosity_s=0.01, cuts=())
     builder = beam(modes, section=stations(1.0, (0.4, -0.5, 0.9)), tip_masses=[lump], nodes={"middle": 0.45})
     builder.rigid_body("hub", mass=1.0, inertia=(0.1, 0.1, 0.1)).revolute("joint", "rod", "hub", parent_node="tip")
     scene = builder.revolute("base", "ground", "rod", axis=(0.0, 0.6, 0.8), child_node="middle").scene()

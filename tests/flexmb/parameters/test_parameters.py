@@ -223,6 +223,8 @@ def reaches(system: flexmb.System, name: str) -> bool:
     try:
         system.parameters([name])
     except ParameterError as error:
+        if "how many points of a beam" in str(error):  # a whole number has no derivative
+            return False
         assert "do not depend on it" in str(error), error
         state, value = system.initial_state, dict(recompiled.floats(system.scene))[name]
         other = flexmb.System(with_values(system.scene, {name: value + 0.1}))
