@@ -207,10 +207,14 @@ def _run(
     from crosscheck.report import mark_unfinished
     from crosscheck.running.sweep import sweep
     from crosscheck.terminal.progress import LiveProgress
+    from crosscheck.timing.charted import chart_jobs
 
     mark_unfinished(records, records.parent)
     with LiveProgress(common.console, shown) as live:
-        sweep(cases, engines, records, fresh=fresh, limits=limits, scheduler=scheduler, listener=live.hear)
+        sweep(
+            cases, engines, records,
+            fresh=fresh, limits=limits, scheduler=scheduler, listener=live.hear, follow=chart_jobs,
+        )  # fmt: skip
 
 
 def _alone(cases: tuple[Case, ...]) -> tuple[Case, ...]:

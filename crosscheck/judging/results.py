@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain
 
 import msgspec
@@ -24,7 +24,7 @@ from crosscheck.judging.uncertainty import (
 from crosscheck.judging.verdict import Ending, Signal
 from crosscheck.library.channels import is_judged, known_to
 from crosscheck.records.drawing import FILM
-from crosscheck.records.kinds import BrokenLine, CaseRecord, Environment, Record, RunRecord, RunStatus
+from crosscheck.records.kinds import BrokenLine, CaseRecord, ChartRecord, Environment, Record, RunRecord, RunStatus
 from crosscheck.records.packing import Packed, unpack
 from flexmb.kept import kept
 from flexmb.run.channels import signal_range
@@ -208,10 +208,11 @@ class Result:
 
 @dataclass(frozen=True)
 class CaseResults:
-    """A case with all its results by (variant, engine, role)."""
+    """A case with all its results by (variant, engine, role), and by (variant, engine) the runs for its charts."""
 
     case: CaseRecord
     results: dict[Key, Result]
+    charted: dict[tuple[str, str], ChartRecord] = field(default_factory=dict)
 
     def get(self, variant: str, engine: str, role: str = "main") -> Result:
         """A result; one that was never recorded "did not run"."""
@@ -246,10 +247,15 @@ def collect(records: Sequence[Record]) -> Session:
         if isinstance(record, RunRecord):
             runs.pop(record.key, None)  # the order is that of the last records
             runs[record.key] = record
+    charted = {record.key: record for record in records if isinstance(record, ChartRecord)}
     return Session(
         environments=tuple(record for record in records if isinstance(record, Environment)),
         cases=tuple(
-            _case_results(case, [run for run in runs.values() if run.case == name]) for name, case in cases.items()
+            replace(
+                _case_results(case, [run for run in runs.values() if run.case == name]),
+                charted={(each.variant, each.engine): each for each in charted.values() if each.case == name},
+            )
+            for name, case in cases.items()
         ),
         broken=tuple(record for record in records if isinstance(record, BrokenLine)),
     )

@@ -92,3 +92,11 @@ def work_changes(case: CaseResults) -> Iterator[WorkChange]:
             now = Counts(run.evaluations, run.steps, run.operations)
             for count, before, after in changes(then, now):
                 yield WorkChange(case.case.case, variant, engine, run.effort, count, before, after, other)
+
+
+def seconds(value: float) -> str:
+    """A time with three digits, in s, ms or us."""
+    for unit, size in (("s", 1.0), ("ms", 1e-3)):
+        if value >= size:
+            return f"{value / size:.3g} {unit}"
+    return f"{value / 1e-6:.3g} us"

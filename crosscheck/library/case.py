@@ -328,12 +328,20 @@ class OpenChannels(_CasePart, frozen=True, kw_only=True):
 
 
 class Chart(_CasePart, frozen=True, kw_only=True):
-    """A work-precision chart: error of `observable` against the most certain result of variant `reference`."""
+    """A work-precision chart: error of `observable` against the most certain result of variant `reference`.
+
+    `engines`, by default all, are those that are shown: a chart of one engine's models shows what a scene needs.
+    """
 
     title: str = ""
     observable: str
     variants: tuple[str, ...]
     reference: str
+    engines: tuple[str, ...] = ()
+
+    def shows(self, variant: str, engine: str) -> bool:
+        """Whether the runs of an engine on a variant are in it."""
+        return variant in self.variants and engine in (self.engines or (engine,))
 
 
 class RunFile(_CasePart, frozen=True, kw_only=True):

@@ -1,11 +1,18 @@
-"""Ladders of efforts with more efforts than an engine or a case gives them."""
+"""Ladders of efforts with more efforts than an engine or a case gives them, and the targets of charts."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Literal
 
+TARGETS = tuple(float(f"1e-{digits}") for digits in range(1, 10))  # errors for which charts have an effort
+WITHIN = 10.0  # factor between a target and the smallest error that meets it
 TIGHTEST = 1e-13  # relative tolerance: one more decade is below 100 eps, where methods take rounding for an error
+
+
+def is_met(error: float, target: float) -> bool:
+    """Whether a run with this error is as accurate as the target, and at most ten times more so."""
+    return target / WITHIN < error <= target
 
 
 def with_extra(values: Sequence[float], extra: Sequence[float]) -> tuple[float, ...]:

@@ -15,7 +15,7 @@ is its conserved quantity, where the case lists engines and expects them to cons
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from itertools import combinations, product
 
 import msgspec
@@ -45,7 +45,7 @@ def select(run: RunFile, asked: tuple[str, ...]) -> RunFile:
         comparisons=kept,
         controls=controls,
         conservations=conservations,
-        charts=_charts(run.charts, {variant.name for variant in variants}),
+        charts=tuple(_charts(run.charts, variants)),
     )
 
 
@@ -232,10 +232,11 @@ def _all(variant: Variant) -> tuple[str, ...]:
     return (*variant.engines, *variant.also)
 
 
-def _charts(charts: tuple[Chart, ...], names: set[str]) -> tuple[Chart, ...]:
-    """Charts whose reference still runs, with the variants that do."""
-    return tuple(
-        msgspec.structs.replace(chart, variants=tuple(name for name in chart.variants if name in names))
-        for chart in charts
-        if chart.reference in names
-    )
+def _charts(charts: tuple[Chart, ...], variants: tuple[Variant, ...]) -> Iterator[Chart]:
+    """Charts whose reference still runs, with the variants and engines that do."""
+    running = {variant.name: _all(variant) for variant in variants}
+    for chart in charts:
+        names = tuple(name for name in chart.variants if name in running)
+        engines = tuple(engine for engine in chart.engines if any(engine in running[name] for name in names))
+        if chart.reference in running and bool(engines) == bool(chart.engines):
+            yield msgspec.structs.replace(chart, variants=names, engines=engines)

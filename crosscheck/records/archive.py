@@ -21,7 +21,7 @@ import msgspec
 from crosscheck.engines.extremes import ROWS, has_extremes, width
 from crosscheck.library.channels import part_of
 from crosscheck.library.check import check_recorded
-from crosscheck.records.kinds import BrokenLine, CaseRecord, Record, RecordedReference, RunRecord, Written
+from crosscheck.records.kinds import BrokenLine, CaseRecord, ChartRecord, Record, RecordedReference, RunRecord, Written
 from crosscheck.records.packing import Packed, packed_bytes, unpack
 from flexmb.output.whole import whole_file
 from flexmb.output.writing import folder, writing
@@ -108,6 +108,8 @@ def _checked(record: Any, limit: int) -> int:
         if record.variants.keys() != {variant.name for variant in record.run.variants}:
             raise ValueError("its variants are not those of its run file")
         return 0 if record.reference is None else _checked_arrays(_arrays(record.reference), limit)
+    if isinstance(record, ChartRecord):
+        return sum(_checked(run, limit) for run in record.runs)
     if not isinstance(record, RunRecord):
         return 0
     sized = 0.0 < record.effort_value < math.inf or (record.effort_value == 0.0 and record.rungs < 2)

@@ -45,6 +45,7 @@ class RecordedReference(msgspec.Struct, frozen=True, kw_only=True, forbid_unknow
 
 
 ENVELOPE = "envelope"  # the role of a run that is made for its extremes over all steps
+CHART = "chart"  # the role of runs that are made for charts of speed against accuracy
 
 RunStatus = Literal["finished", "diverged", "failed", "crashed", "did not finish", "refused", "did not run"]
 
@@ -200,6 +201,27 @@ class RunRecord(_OneRecord, frozen=True, kw_only=True, tag="run"):
         return (self.case, self.variant, self.role, self.engine, self.effort)
 
 
+class ChartRecord(_OneRecord, frozen=True, kw_only=True, tag="chart"):
+    """The runs that one engine made for the charts of a variant, beside those that are judged.
+
+    `made_by` also stands for the charts' references and targets. `message` says why there are fewer runs than targets.
+    """
+
+    case: str
+    variant: str
+    engine: str
+    scene: str
+    made_by: str = ""
+    runs: tuple[RunRecord, ...] = ()
+    message: str = ""
+    role: str = CHART
+
+    @property
+    def key(self) -> tuple[str, ...]:
+        """Its identity: a later record with the same key replaces an earlier one."""
+        return (self.case, self.variant, self.role, self.engine)
+
+
 class Confirmed(_OneRecord, frozen=True, kw_only=True, tag="confirmed"):
     """States that the result which an earlier session recorded under this key is also a result of this session."""
 
@@ -223,5 +245,5 @@ class BrokenLine:
         return f"{self.file}, line {self.number}: not a record of this version: {self.reason}"
 
 
-Written = Environment | CaseRecord | RunRecord | Confirmed
+Written = Environment | CaseRecord | RunRecord | ChartRecord | Confirmed
 Record = Written | BrokenLine

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from crosscheck.records.kinds import BrokenLine, CaseRecord, Confirmed, Environment, Record, RunRecord
+from crosscheck.records.kinds import BrokenLine, CaseRecord, ChartRecord, Confirmed, Environment, Record, RunRecord
 
 
 def standing(records: Sequence[Record]) -> list[Record]:
@@ -30,7 +30,9 @@ def standing(records: Sequence[Record]) -> list[Record]:
     return [
         record
         for place, record in enumerate(records)
-        if not isinstance(record, RunRecord) or place >= asked.get(record.case, 0) or _work(record) in confirmed
+        if not isinstance(record, RunRecord | ChartRecord)
+        or place >= asked.get(record.case, 0)
+        or _work(record) in confirmed
     ]
 
 
@@ -50,5 +52,5 @@ def _belongs(record: Record, cases: set[str]) -> bool:
     return not isinstance(record, Environment) and record.case in cases
 
 
-def _work(record: RunRecord | Confirmed) -> tuple[str, ...]:
+def _work(record: RunRecord | ChartRecord | Confirmed) -> tuple[str, ...]:
     return (record.case, record.variant, record.role, record.engine, record.scene, record.made_by)

@@ -17,6 +17,7 @@ from crosscheck.library.case import Provenance
 from crosscheck.report.mutations import CaseScore
 from crosscheck.report.peaks import PeakRow, largest_loads
 from crosscheck.report.places import CasePlace
+from crosscheck.report.speed import SpeedTable, speed_tables
 from crosscheck.report.views import (
     Block,
     VerdictCell,
@@ -47,6 +48,7 @@ class CaseView:
     unreferenced: str
     work_changes: list[str]
     flagged: list[FlaggedGoal]
+    speeds: list[SpeedTable]
     timings: list[dict[str, Any]]
     peaks: list[PeakRow]
     mutation: CaseScore | None
@@ -81,6 +83,7 @@ def case_view(
         unreferenced=f"It {NO_REFERENCE.format(record.case)}" if record.case in outcome.unreferenced else "",
         work_changes=[str(change) for change in outcome.work_changes if change.case == record.case],
         flagged=[each for each in outcome.flagged if each.case == record.case],
+        speeds=speed_tables(case),
         timings=_timings(case),
         peaks=largest_loads(case),
         mutation=mutation,

@@ -10,6 +10,7 @@ import msgspec
 from jinja2 import Environment, PackageLoader, select_autoescape
 from markupsafe import Markup, escape
 
+from crosscheck.judging.work import seconds
 from flexmb.output.printable import printable
 
 
@@ -27,6 +28,7 @@ def templates() -> Environment:
     environment.filters["code"] = code
     environment.filters["breakable"] = _breakable
     environment.filters["power"] = _power
+    environment.filters["seconds"] = seconds
     return environment
 
 

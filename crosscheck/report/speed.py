@@ -12,12 +12,13 @@ from dataclasses import dataclass
 from statistics import median
 from typing import Any
 
-from crosscheck.judging.results import Session
+from crosscheck.judging.results import CaseResults, Session
+from crosscheck.library.efforts import TARGETS, WITHIN, is_met
 from crosscheck.report.places import CasePlace
-from crosscheck.report.workprecision import WorkPrecision, work_precision
+from crosscheck.report.workprecision import Point, WorkPrecision, work_precision
 
 REACHED = 1e-6
-LEVELS = (1e-3, REACHED, 1e-9)  # errors at which engines are compared in the table
+LEVELS = (1e-2, 1e-3, 1e-4, REACHED, 1e-9)  # errors at which engines are compared in the table
 
 
 @dataclass(frozen=True)
@@ -38,11 +39,13 @@ class ChartOfCase:
 @dataclass(frozen=True)
 class Standing:
     """An engine at one level of error: its median time relative to the fastest engine of each chart (None if it never
-    was as accurate), the charts in which it was, and in how many of them it was the fastest."""
+    was as accurate), the charts in which it was, in how many of them it was the fastest, and in how many it has a run
+    that is not more than ten times as accurate: in the others it is *at most* so slow."""
 
     ratio: float | None
     reached: int
     first: int
+    met: int = 0
 
 
 @dataclass(frozen=True)
@@ -73,6 +76,8 @@ def speed_view(session: Session, places: Mapping[str, CasePlace]) -> SpeedView:
     charts = []
     for case in session.cases:
         for asked in case.case.run.charts:
+            if asked.engines:  # of models, and no comparison of engines
+                continue
             chart = work_precision(case, asked)
             unit = None if chart is None else unit_of_time(chart)
             if chart is not None and unit is not None:
@@ -128,12 +133,72 @@ def _rows(charts: Iterable[WorkPrecision]) -> list[EngineRow]:
 
 def standing(charts: Iterable[WorkPrecision], engine: str, error: float) -> Standing:
     """How an engine stands at one level of error."""
-    ratios = []
+    ratios, met = [], 0
     for chart in charts:
         times = fastest(chart, error)
         if engine in times:
             ratios.append(times[engine] / min(times.values()))
-    return Standing(median(ratios) if ratios else None, len(ratios), sum(ratio == 1.0 for ratio in ratios))
+            met += any(point.engine == engine and meets(chart, point, error) for point in chart.points)
+    first = sum(ratio == 1.0 for ratio in ratios)
+    return Standing(median(ratios) if ratios else None, len(ratios), first, met)
+
+
+def meets(chart: WorkPrecision, point: Point, target: float) -> bool:
+    """Whether a run is as accurate as a target and at most ten times more so, as far as the reference can tell."""
+    return point.error is not None and is_met(max(point.error, chart.reference_uncertainty), target)
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What an error costs: the time (s) of the fastest run that is as accurate, None if none is; `most` where all of
+    these are more than ten times as accurate, so that a coarser effort may be faster."""
+
+    solve_s: float | None
+    most: bool = False
+
+
+@dataclass(frozen=True)
+class SpeedRow:
+    """An engine on a variant in a chart: a cell for each of the targets, and why some are not met."""
+
+    engine: str
+    variant: str
+    cells: tuple[Cell, ...]
+    why: str
+
+
+@dataclass(frozen=True)
+class SpeedTable:
+    """What each target error costs in one chart; targets that the reference cannot tell are left out."""
+
+    title: str
+    targets: tuple[float, ...]
+    rows: tuple[SpeedRow, ...]
+
+
+def speed_tables(case: CaseResults) -> list[SpeedTable]:
+    """The tables of a case, one for each of its charts."""
+    drawn = (work_precision(case, asked) for asked in case.case.run.charts)
+    return [_table(case, chart) for chart in drawn if chart is not None]
+
+
+def _table(case: CaseResults, chart: WorkPrecision) -> SpeedTable:
+    targets = tuple(target for target in TARGETS if chart.reference_uncertainty <= target / WITHIN)
+    rows = []
+    for engine, variant in dict.fromkeys((point.engine, point.variant) for point in chart.points):
+        own = [point for point in chart.points if (point.engine, point.variant) == (engine, variant)]
+        record = case.charted.get((variant, engine))
+        cells = tuple(_cell(chart, own, target) for target in targets)
+        rows.append(SpeedRow(engine, variant, cells, "" if record is None else record.message))
+    return SpeedTable(chart.title, targets, tuple(rows))
+
+
+def _cell(chart: WorkPrecision, own: Iterable[Point], target: float) -> Cell:
+    enough = [point for point in own if point.error is not None and point.error <= target and point.wall_s > 0.0]
+    if not enough:
+        return Cell(None)
+    met = any(meets(chart, point, target) for point in enough)
+    return Cell(min(point.wall_s for point in enough), not met)
 
 
 def fastest(chart: WorkPrecision, error: float) -> dict[str, float]:

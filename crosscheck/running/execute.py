@@ -28,7 +28,7 @@ def execute(job: Job, emit: Callable[[RunRecord | Confirmed | str], None]) -> No
     """Run a job and emit its outcomes as records, and the name of every step before it begins."""
 
     def recorded(found: Solved | Confirmed | str) -> None:
-        emit(_packed(found) if isinstance(found, Solved) else found)
+        emit(packed(found) if isinstance(found, Solved) else found)
 
     solve_job(job, recorded)
 
@@ -52,7 +52,7 @@ def solve_job(job: Job, emit: Callable[[Solved | Confirmed | str], None]) -> Non
 
 def _solve_efforts(found: Engine, job: Job, scene: Scene, emit: Callable[[Solved | Confirmed | str], None]) -> None:
     """Emit one outcome for each effort that is not yet recorded, or the engine's refusal of the scene."""
-    engine = _checked(found, job)
+    engine = checked(found, job)
     version = engine.version()
     support = engine.supports(scene)
     blank = msgspec.structs.replace(job.blank, version=version, support=support.reason)
@@ -98,11 +98,13 @@ def _with_rounding(engine: Engine, job: Job, scene: Scene, effort: Effort, solve
     return solved._replace(record=msgspec.structs.replace(solved.record, rounding=found))
 
 
-def _checked(engine: Engine, job: Job) -> Engine:
+def checked(engine: Engine, job: Job) -> Engine:
+    """The engine with its answers held against the contract, and asked about the job's times."""
     return CheckedEngine(engine, t_start=float(job.times[0]), duration_s=float(np.ptp(job.times)))
 
 
-def _packed(solved: Solved) -> RunRecord:
+def packed(solved: Solved) -> RunRecord:
+    """The record of an outcome with its arrays."""
     if solved.times is None:
         return solved.record
     channels = {name: pack(values) for name, values in solved.channels.items()}

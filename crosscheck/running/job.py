@@ -13,6 +13,7 @@ from crosscheck.library.case import Variant
 from crosscheck.library.efforts import continued, with_extra
 from crosscheck.records.kinds import RunRecord
 from crosscheck.running.scheduler import TIME_LIMIT_S
+from crosscheck.running.tuned import Charted
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -60,6 +61,7 @@ class Job:
     `error` cannot be run. It is stopped after `time_limit_s`; `expected_s` is what it took the last time, None if
     unknown. A `lean` job runs each effort once, even a short one, and stores only `kept`. `linear` is what it asks of
     the linearised motion. With `rounding`, the finest effort is run with moved inputs too (`crosscheck.running.moved`).
+    A job that is `charted` runs efforts for charts, which it finds itself (`crosscheck.running.charting`).
     """
 
     case: str
@@ -83,6 +85,7 @@ class Job:
     lean: bool = False
     linear: tuple[LinearPart, ...] = ()
     rounding: bool = False
+    charted: Charted | None = None
 
     @property
     def work(self) -> tuple[str, str, str, str]:

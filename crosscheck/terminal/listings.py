@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
+from crosscheck.judging.work import seconds
 from crosscheck.terminal.text import marked, words
 from flexmb.output.listing import Listing, figures, names, prose
 from flexmb.output.versions import version_of
@@ -121,11 +122,3 @@ def _timed_table(timed: list[Contest]) -> Listing:
 
 def _percent(value: float, least: float) -> str:
     return f"{100.0 * (value / least - 1.0):.0f}"
-
-
-def seconds(value: float) -> str:
-    """A time with three digits, in s, ms or us."""
-    for unit, size in (("s", 1.0), ("ms", 1e-3)):
-        if value >= size:
-            return f"{value / size:.3g} {unit}"
-    return f"{value / 1e-6:.3g} us"

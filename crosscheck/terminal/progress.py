@@ -26,7 +26,7 @@ from rich.progress import (
 from rich.table import Column, Table
 from rich.text import Text
 
-from crosscheck.records.kinds import RunRecord
+from crosscheck.records.kinds import ChartRecord, RunRecord
 from crosscheck.running.expected import Remaining
 from crosscheck.running.job import Job
 from crosscheck.running.scheduler import Event
@@ -62,6 +62,7 @@ class LiveProgress:
         self._overall: TaskID | None = None
         self._remaining = Remaining()
         self._begin = 0.0
+        self._heard = 0
         self._lines: dict[int, TaskID] = {}
         self._records: dict[int, list[RunRecord]] = {}
         self._started: dict[int, float] = {}
@@ -85,8 +86,12 @@ class LiveProgress:
             self._heartbeat.hear(jobs, event)
         if self._overall is None:
             self._overall = self.bars.add_task("all runs", total=len(jobs))
-            self._remaining.expect((number, job.engine, job.expected_s) for number, job in enumerate(jobs))
             self._begin = time.monotonic()
+        if self._heard < len(jobs):  # an outcome may ask for more
+            later = enumerate(jobs[self._heard :], start=self._heard)
+            self._remaining.expect((number, job.engine, job.expected_s) for number, job in later)
+            self._heard = len(jobs)
+            self.bars.update(self._overall, total=len(jobs))
         title = printable(jobs[event.job].title)
         if event.kind == "started":
             self._started[event.job] = time.perf_counter()
@@ -95,6 +100,8 @@ class LiveProgress:
             self._lines[event.job] = self.bars.add_task(f"{title}: starting", total=None, running=True)
         elif event.kind == "emitted" and isinstance(event.content, RunRecord):
             self._records[event.job].append(event.content)
+        elif event.kind == "emitted" and isinstance(event.content, ChartRecord):
+            self._records[event.job] += event.content.runs
         elif event.kind == "emitted" and isinstance(event.content, str):
             self.bars.update(self._lines[event.job], description=f"{title}: {printable(event.content)}")
         elif event.kind != "emitted":

@@ -1,5 +1,6 @@
 """Error against time: every engine over its ladder of efforts, per observable, with the Pareto front of each.
 
+Besides the efforts that are judged, each engine has those that meet target errors (`crosscheck.running.tuned`).
 Errors are distances from `reference.csv` up to its horizon, relative to the signal's size, of the timed solves
 themselves. Errors below the reference's own uncertainty, the floor, cannot be distinguished: only their times count.
 """
@@ -16,7 +17,7 @@ from crosscheck.library.find import Case
 from crosscheck.running.scheduler import Limits
 from crosscheck.running.sweep import Listener
 from crosscheck.timing.facts import EngineFacts, facts_of
-from crosscheck.timing.rivals import Rival, Rivals, Rung, find_rivals, timed
+from crosscheck.timing.rivals import Rival, Rivals, Rung, chart_channels, find_rivals, timed
 from crosscheck.timing.turns import Timed
 
 ROUNDS = 5
@@ -81,7 +82,9 @@ def chart(
 ) -> CaseCharts:
     """Run, judge and time all efforts of a case. Problems are part of the result; nothing is raised."""
     try:
-        rivals = find_rivals(case, engines, variants, provider=provider, limits=limits, listener=listener)
+        rivals = find_rivals(
+            case, engines, variants, provider=provider, limits=limits, listener=listener, charted=True
+        )
         observables = _observables(case, rivals)
     except CaseError as error:
         return CaseCharts(case.name, case.run.title, "", 0.0, rounds, problem=str(error))
@@ -104,8 +107,7 @@ def _observables(case: Case, rivals: Rivals) -> list[str]:
     judged = list(dict.fromkeys(name for rival in rivals.found for name in rival.scales))
     if not judged:
         raise CaseError(f"{case.name}: no engine finished, so that there is nothing to draw: {_first(rivals)}")
-    wanted = dict.fromkeys(chart.observable for chart in case.run.charts)
-    return [name for name in wanted if name in judged] or judged[:1]
+    return chart_channels(case, judged)
 
 
 def _first(rivals: Rivals) -> str:

@@ -51,6 +51,7 @@ def _series(axes: Axes, chart: ChartData, drawn: list[ChartPoint], several_varia
     for name in dict.fromkeys((point.series, point.variant) for point in drawn):
         colour, marker = next(looks)
         points = [point for point in drawn if (point.series, point.variant) == name]
+        points = sorted(points, key=lambda point: point.error or 0.0, reverse=True)
         seconds, errors = [point.solve_s or 0.0 for point in points], [_height(chart, point) for point in points]
         upper = [max(point.quartiles_s[1] - (point.solve_s or 0.0), 0.0) for point in points if point.quartiles_s]
         label = f"{name[0]} ({name[1]})" if several_variants else name[0]
@@ -58,6 +59,8 @@ def _series(axes: Axes, chart: ChartData, drawn: list[ChartPoint], several_varia
             seconds, errors, xerr=[[0.0] * len(points), upper], color=colour, marker=marker, markersize=5,
             linewidth=1.0, elinewidth=0.7, label=label,
         )  # fmt: skip
+        at = (points[-1].solve_s or 0.0, _height(chart, points[-1]))
+        axes.annotate(label, at, (6, 0), textcoords="offset points", va="center", fontsize="small", color=colour)
 
 
 def _front(axes: Axes, chart: ChartData, drawn: list[ChartPoint]) -> None:

@@ -20,7 +20,7 @@ from crosscheck.engines.registry import PROVIDER
 from crosscheck.judging.against_reference import ReferenceSignals, hold, of_record, shared_times
 from crosscheck.judging.results import CaseResults, Result, collect
 from crosscheck.judging.verdict import Finding
-from crosscheck.library.case import CaseError, Variant
+from crosscheck.library.case import CaseError, Chart, Variant
 from crosscheck.library.find import Case
 from crosscheck.records.archive import read
 from crosscheck.records.kinds import RecordedReference, ReferenceGoals, RunRecord
@@ -28,6 +28,7 @@ from crosscheck.running.job import Job
 from crosscheck.running.plan import plan, recorded_reference
 from crosscheck.running.scheduler import Limits
 from crosscheck.running.sweep import Listener, run_planned
+from crosscheck.timing.charted import chart_jobs
 from crosscheck.timing.turns import Timed, in_turns
 from flexmb.run.channels import distance
 from flexmb.typing import Real
@@ -35,7 +36,7 @@ from flexmb.typing import Real
 
 @dataclass(frozen=True)
 class Rung:
-    """One effort of a rival: its status, and its relative errors in the judged channels.
+    """One effort of a rival: its status, and its relative errors in the judged channels that it has recorded.
 
     `solve_s` is the engine's own time of that single solve.
     """
@@ -107,9 +108,11 @@ def find_rivals(
     provider: str = PROVIDER,
     limits: Limits,
     listener: Listener = lambda jobs, event: None,
+    charted: bool = False,
 ) -> Rivals:
     """Run every engine (`engines`, by default those of the variants) and judge it by the case's reference.
 
+    Where they are `charted`, they have further efforts, tuned to the targets of charts, which are judged by nothing.
     `variants` are by default that of the reference; all are compared with it. CaseError if the case has no
     reference that can be used, or no such variant.
     """
@@ -120,10 +123,14 @@ def find_rivals(
         raise CaseError(f"{case.name}: none of {', '.join(engines)} runs {', '.join(variants or (held.variant,))}")
     reference = of_record(held)
     record, jobs = plan(replace(case, run=case.run.alone(*chosen)), (), provider, limits.time_s)
+    if charted:
+        charts = tuple(_drawn(name, chosen, held.variant) for name in chart_channels(case, tuple(reference.channels)))
+        run = msgspec.structs.replace(record.run, charts=charts)
+        record = msgspec.structs.replace(record, run=run, reference=held)
     jobs = [replace(job, kept=tuple(reference.channels)) for job in jobs]
     with TemporaryDirectory() as folder:
         records = Path(folder) / "records.jsonl"
-        run_planned([(record, jobs)], (), records, limits=limits, listener=listener)
+        run_planned([(record, jobs)], (), records, limits=limits, listener=listener, follow=chart_jobs)
         (results,) = collect(read(records)).cases
     return Rivals(
         case=case,
@@ -131,6 +138,16 @@ def find_rivals(
         reference=reference,
         found=tuple(_rival(job, record.variants[job.variant].level, results, reference, held) for job in jobs),
     )
+
+
+def chart_channels(case: Case, judged: Sequence[str]) -> list[str]:
+    """Those of the `judged` channels that the case's charts show; if there are none, the first."""
+    wanted = dict.fromkeys(chart.observable for chart in case.run.charts)
+    return [name for name in wanted if name in judged] or list(judged[:1])
+
+
+def _drawn(observable: str, variants: Sequence[Variant], reference: str) -> Chart:
+    return Chart(observable=observable, variants=tuple(variant.name for variant in variants), reference=reference)
 
 
 def timed(entered: Iterable[tuple[Rival, Rung]], rounds: int) -> dict[int, Timed]:
@@ -158,6 +175,8 @@ def _asked(variant: Variant, engines: Sequence[str]) -> Variant:
 
 def _rival(job: Job, level: str, case: CaseResults, reference: ReferenceSignals, held: RecordedReference) -> Rival:
     asked, result = held.asked.get(job.engine) or _of_all(held), case.get(job.variant, job.engine)
+    charts = case.charted.get((job.variant, job.engine))
+    more = () if charts is None else charts.runs
     findings = list(hold(result, reference, asked, result.open))
     known = ((name, finding.scale) for name, _, finding in findings if finding.scale is not None)
     scales = {name: scale for name, scale in known if scale > 0.0 and name not in result.open}
@@ -172,7 +191,7 @@ def _rival(job: Job, level: str, case: CaseResults, reference: ReferenceSignals,
         status=worst.status,
         reason=worst.reason,
         compile_s=result.runs[0].compile_s if result.runs else 0.0,
-        rungs=tuple(_rung(run, result, reference, scales) for run in result.runs),
+        rungs=tuple(_rung(run, result, reference, scales) for run in (*result.runs, *more)),
         scales=scales,
     )
 

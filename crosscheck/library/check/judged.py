@@ -97,6 +97,14 @@ def check_chart(run: RunFile, chart: Chart, place: Place) -> Iterator[Defect]:
     for key, name in (*(("variants", variant) for variant in chart.variants), ("reference", chart.reference)):
         if name not in names:
             yield no_variant(name, names, place.key(key))
+    running = {
+        engine for each in run.variants if each.name in chart.variants for engine in (*each.engines, *each.also)
+    }
+    for engine in chart.engines:
+        if engine not in running:
+            yield problem(
+                place.key("engines"), f'"{engine}" runs none of the chart\'s variants', " or ".join(sorted(running))
+            )
 
 
 def check_patterns(goals: dict[str, float], scales: dict[str, float], place: Place) -> Iterator[Defect]:

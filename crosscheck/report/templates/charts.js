@@ -49,6 +49,26 @@ function legendHeight(traces, width) {
 }
 const BELOW = { orientation: "h", yref: "container", y: 0, yanchor: "bottom", tracegroupgap: 0, font: { size: 11 } }; // a legend at the lower edge
 
+// Names at the ends of lines, none over another: annotations for ends { x, y, text, colour } in powers of ten, on axes of
+// `ranges` [[x0, x1], [y0, y1]] that are drawn on `size` [width, height] pixels.
+const LABEL = 13; // pixels between two names
+function endLabels(ends, [[x0, x1], [y0, y1]], [width, height]) {
+  const placed = [];
+  const seen = ends.map(end => ({ ...end, px: (end.x - x0) / (x1 - x0) * width, py: (y1 - end.y) / (y1 - y0) * height, wide: 6.2 * end.text.length + 12 }));
+  for (const end of seen.sort((a, b) => a.py - b.py)) {
+    const left = end.px + end.wide + 10 > width; // no room to the right of the point
+    const from = left ? end.px - 10 - end.wide : end.px + 10;
+    let at = end.py;
+    for (const other of placed) if (from < other.to && other.from < from + end.wide && at < other.at + LABEL) at = Math.max(at, other.at + LABEL);
+    at = Math.min(at, height - LABEL / 2);
+    placed.push({ from, to: from + end.wide, at });
+    placed.sort((a, b) => a.at - b.at);
+    end.note = { xref: "x", yref: "y", x: end.x, y: end.y, ax: left ? -10 : 10, ay: at - end.py, xanchor: left ? "right" : "left", showarrow: true, arrowhead: 0,
+      arrowwidth: 0.6, arrowcolor: end.colour, text: `<b>${end.text}</b>`, font: { size: 11, color: end.colour }, bgcolor: tone("page"), borderpad: 0 };
+  }
+  return seen.map(end => end.note);
+}
+
 const column = (series, j) => Array.from(series[j]);
 
 function layout(extra) {
@@ -123,10 +143,11 @@ function drawDrift(node, drift, series) {
 
 function drawWork(node, work) {
   const variants = [...new Set(work.points.map(p => p.variant))], groups = new Map();
+  const ofModels = new Set(work.points.map(p => p.engine)).size < variants.length, tint = p => colour(ofModels ? p.variant : p.engine);
   const errors = work.points.filter(p => p.error > 0).map(p => p.error);
   const margin = 10 ** (Math.ceil(Math.log10(Math.max(...errors, 1e-16))) + 0.6);
   for (const point of work.points) {
-    const key = [point.engine, ...(variants.length > 1 ? [point.variant] : []), point.method].join(" · ");
+    const key = (ofModels ? [point.variant, point.engine] : [point.engine, ...(variants.length > 1 ? [point.variant] : []), point.method]).join(" · ");
     groups.set(key, [...(groups.get(key) || []), point]);
   }
   const low = Math.floor(Math.log10(Math.min(...errors, work.doubt))) - 0.7;
@@ -134,8 +155,8 @@ function drawWork(node, work) {
   const text = p => `${plain(p.effort)}<br>${p.evaluations || "?"} evaluations<br>${plain(p.message || "")}`;
   const traces = [];
   for (const [key, points] of groups) {
-    const good = points.filter(p => p.error > 0), bad = points.filter(p => !(p.error > 0));
-    const marker = { color: colour(points[0].engine), symbol: SYMBOLS[variants.indexOf(points[0].variant) % SYMBOLS.length], size: 8 };
+    const good = points.filter(p => p.error > 0).sort((a, b) => b.error - a.error), bad = points.filter(p => !(p.error > 0));
+    const marker = { color: tint(points[0]), symbol: SYMBOLS[variants.indexOf(points[0].variant) % SYMBOLS.length], size: 8 };
     traces.push({ x: good.map(wall), y: good.map(p => p.error), text: good.map(text), name: plain(key), legendgroup: key, type: "scatter",
       mode: "lines+markers", line: { color: marker.color, width: 1 }, marker, hovertemplate: "%{x:.3g} s, error %{y:.2e}<br>%{text}<extra>" + plain(key) + "</extra>" });
     if (bad.length) traces.push({ x: bad.map(wall), y: bad.map(() => margin), text: bad.map(text), name: plain(key) + " failed", legendgroup: key,
@@ -145,20 +166,25 @@ function drawWork(node, work) {
   const front = work.points.filter(p => p.best && p.error > 0);
   traces.unshift({ x: front.map(wall), y: front.map(p => p.error), name: "Pareto front", type: "scatter", mode: "lines",
     line: { color: tone("band"), width: 9, shape: "hv" }, hoverinfo: "skip" });
-  const width = node.clientWidth, narrow = width < 600, left = narrow ? 90 : 100;
+  const width = node.clientWidth, narrow = width < 600, left = narrow ? 90 : 100, top = Math.log10(margin) + 0.4;
   const times = fitted("wall time of the solve, s (compile time apart)", width - left - 12), below = legendHeight(traces, width - left - 12) + 40 + 16 * times.split("<br>").length;
+  const across = [work.points.map(wall).reduce((a, b) => Math.min(a, b)), work.points.map(wall).reduce((a, b) => Math.max(a, b))].map(Math.log10);
+  const range = [across[0] - 0.1, across[1] + (width < 420 ? 0.1 : 0.12 + 0.15 * (across[1] - across[0]))]; // room for names
+  const ends = width < 420 ? [] : [...groups].map(([key, points]) => [key, points.filter(p => p.error > 0).sort((a, b) => a.error - b.error)[0]])
+    .filter(([, last]) => last).map(([key, last]) => ({ x: Math.log10(wall(last)), y: Math.log10(last.error), text: plain(ofModels ? last.variant : key), colour: tint(last) }));
   node.style.height = 374 + below + "px";
   Plotly.react(node, traces, layout({
     hovermode: "closest", margin: { l: left, r: 12, t: 26, b: below },
-    xaxis: { type: "log", exponentformat: "power", nticks: narrow ? 5 : 12,
+    xaxis: { type: "log", exponentformat: "power", nticks: narrow ? 5 : 12, range,
       title: { font: { size: 12 }, standoff: 4, text: times } },
-    yaxis: { type: "log", exponentformat: "power", range: [low, Math.log10(margin) + 0.4], dtick: Math.ceil((Math.log10(margin) - low) / 9),
+    yaxis: { type: "log", exponentformat: "power", range: [low, top], dtick: Math.ceil((Math.log10(margin) - low) / 9),
       title: { font: { size: 12 }, text: fitted(`error of ${plain(work.observable)}, relative to ${work.scale.toPrecision(3)} ${work.unit}, against ${plain(work.reference)}`, 330) } },
     shapes: [{ type: "rect", xref: "paper", x0: 0, x1: 1, y0: 1e-18, y1: work.doubt, fillcolor: tone("wash"), line: { width: 0 }, layer: "below" }],
     annotations: [
-      { xref: "paper", x: 0.01, xanchor: "left", y: Math.log10(work.doubt), yanchor: "top", showarrow: false, font: { size: 10.5, color: tone("soft") },
+      { xref: "paper", x: 0.99, xanchor: "right", y: Math.log10(work.doubt), yanchor: "top", showarrow: false, font: { size: 10.5, color: tone("soft") },
         text: "below the uncertainty of the reference" },
-      { xref: "paper", x: 0, xanchor: "left", yref: "paper", y: 1, yanchor: "bottom", showarrow: false, font: { size: 10.5, color: tone("soft") }, text: "× at the top: failed runs" }],
+      { xref: "paper", x: 0, xanchor: "left", yref: "paper", y: 1, yanchor: "bottom", showarrow: false, font: { size: 10.5, color: tone("soft") }, text: "× at the top: failed runs" },
+      ...endLabels(ends, [range, [low, top]], [width - left - 12, 348])],
     legend: BELOW,
   }), CONFIG);
 }

@@ -7,14 +7,14 @@ function chartsOf(data, which) {
   return data.charts.filter((chart, i) => !which || chart.family === which || String(i) === which);
 }
 
-// Runs of one chart that belong together, by variant and method, in the order of their times.
+// Runs of one chart that belong together, by variant and method, from the largest error to the smallest.
 function ladders(chart, engine) {
   const groups = new Map();
   for (const point of chart.points) {
     const key = point.variant + "\n" + point.method;
     if (point.engine === engine) groups.set(key, [...(groups.get(key) || []), point]);
   }
-  return [...groups.values()];
+  return [...groups.values()].map(points => points.sort((a, b) => b.error - a.error));
 }
 
 // One curve out of several: nothing is drawn between them.
@@ -66,6 +66,17 @@ function curves(charts, engines, relative, seen) {
   return traces;
 }
 
+// The ends of the lines that are drawn, by the names of their engines: medians of several charts, ladders of one.
+function named(charts, engines, relative) {
+  if (charts.length > 1 && !relative) return []; // a cloud of lines
+  return engines.flatMap(engine => {
+    const own = charts.length > 1 ? medians(charts, chart => chart.points.filter(p => p.engine === engine))
+      : joined(charts.map(chart => ({ chart, points: chart.points.filter(p => p.engine === engine), unit: relative ? chart.unit_s : 1 })), {});
+    const ends = own.x.map((x, i) => [x, own.y[i]]).filter(([x, y]) => x > 0 && y > 0).sort((a, b) => a[1] - b[1]);
+    return ends.length ? [{ x: Math.log10(ends[0][0]), y: Math.log10(ends[0][1]), text: plain(engine), colour: colour(engine) }] : [];
+  });
+}
+
 function drawSpeed(node, data) {
   const charts = chartsOf(data, chosen.cases), relative = chosen.time === "relative", width = node.clientWidth, narrow = width < 600;
   const names = list => data.engines.filter(engine => list.some(chart => chart.points.some(p => p.engine === engine)));
@@ -77,17 +88,21 @@ function drawSpeed(node, data) {
   const traces = curves(charts, engines, relative, data.engines);
   const times = fitted(relative ? "wall time of the solve, relative to the fastest run of the chart with an error of 1e-6" : "wall time of the solve, s", across);
   const below = legendHeight(traces, across) + 44 + 16 * times.split("<br>").length;
-  node.style.height = 450 + below + "px";
+  const tall = 360, tops = high + 0.3, bottom = low - 0.3; // with heading and form it fits a window of 800 pixels
+  node.style.height = tall + below + "px";
+  const drawn = traces.flatMap(trace => trace.x.filter(x => x > 0)).map(Math.log10), from = Math.min(...drawn), to = Math.max(...drawn);
+  const range = [from - 0.1, to + (narrow ? 0.1 : 0.12 + 0.1 * (to - from))];
+  const ends = narrow ? [] : named(charts, engines, relative);
   Plotly.react(node, traces, layout({
     hovermode: "closest", margin: { l: left, r: 12, t: 10, b: below },
-    xaxis: { type: "log", exponentformat: "power", nticks: narrow ? 6 : 12, title: { font: { size: 12 }, standoff: 6,
+    xaxis: { type: "log", exponentformat: "power", nticks: narrow ? 6 : 12, range, title: { font: { size: 12 }, standoff: 6,
       text: times } },
-    yaxis: { type: "log", exponentformat: "power", range: [low - 0.3, high + 0.3], dtick: Math.max(1, Math.round((high - low) / 8)),
+    yaxis: { type: "log", exponentformat: "power", range: [bottom, tops], dtick: Math.max(1, Math.round((high - low) / 8)),
       title: { font: { size: 12 }, text: fitted("error, relative to the range, against " + plain(against), 400) } },
     shapes: relative ? [["x", 1], ["y", data.reached]].map(([axis, at]) => ({ type: "line", layer: "below", line: { color: tone("edge"), width: 1, dash: "dot" },
       ...(axis === "x" ? { x0: at, x1: at, yref: "paper", y0: 0, y1: 1 } : { y0: at, y1: at, xref: "paper", x0: 0, x1: 1 }) })) : [],
     annotations: [{ xref: "paper", yref: "paper", x: 0.01, y: 0.01, xanchor: "left", yanchor: "bottom", showarrow: false, text: "↙ faster and more accurate",
-      font: { size: 11, color: tone("soft") } }],
+      font: { size: 11, color: tone("soft") } }, ...endLabels(ends, [range, [bottom, tops]], [across, tall - 10])],
     legend: BELOW,
   }), CONFIG);
   if (!node.listens) {

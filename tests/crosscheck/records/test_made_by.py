@@ -36,6 +36,7 @@ WITHOUT_PART = {
     "crosscheck.library": "reads cases and makes scenes, as plan",
     "crosscheck.running.plan": "makes the scene, which is in the record's own key, and holds the stored reference",
     "crosscheck.running.job": "says which efforts are run; the record's own key has scene, sample times, effort, place",
+    "crosscheck.running.tuned": "chooses further efforts for charts; their records have a key of their own",
     "crosscheck.records.machine": "tells the reader of a report about the machine", "crosscheck.drawing.draw": "draws",
     "crosscheck.drawing.film": "makes a scene too",
     "crosscheck.engines.functions_of_time": "says to the drawing how a wheel starts; native evaluates functions itself",

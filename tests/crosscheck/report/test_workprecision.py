@@ -13,13 +13,13 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 from msgspec.structs import replace
 
+from crosscheck.judging import chart_reference
 from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.judging.results import collect
 from crosscheck.library.find import load_case
 from crosscheck.records.archive import read
 from crosscheck.records.kinds import CaseRecord, Record, RecordedReference, ReferenceGoals, RunRecord
 from crosscheck.records.packing import pack, unpack
-from crosscheck.report import workprecision
 from crosscheck.report.speed import REACHED, fastest, standing, unit_of_time
 from crosscheck.report.store import Store
 from crosscheck.report.workprecision import Point, WorkPrecision, work_precision
@@ -131,9 +131,9 @@ def test_runs_at_other_times_than_the_reference_have_no_error(records: list[Reco
 def test_of_equally_certain_results_another_code_is_the_reference(
     records: list[Record], chart: WorkPrecision, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(workprecision, "RESOLVED", float("inf"))
+    monkeypatch.setattr(chart_reference, "RESOLVED", float("inf"))
     assert drawn(records).reference.startswith("fine on")
-    monkeypatch.setattr(workprecision, "OWN_CODE", ("fine",))
+    monkeypatch.setattr(chart_reference, "OWN_CODE", ("fine",))
     assert drawn(records).reference.startswith("stepper on")
 
 

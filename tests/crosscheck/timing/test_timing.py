@@ -14,12 +14,12 @@ from typer.testing import CliRunner
 
 from crosscheck import cli
 from crosscheck.engines.contract import Effort
+from crosscheck.judging.work import seconds
 from crosscheck.library.case import CaseError
 from crosscheck.library.find import Case, load_case, resolve
 from crosscheck.running.job import Job
 from crosscheck.running.plan import plan
 from crosscheck.running.scheduler import Limits
-from crosscheck.terminal.listings import seconds
 from crosscheck.timing import turns
 from crosscheck.timing.bench import CaseBench, Contest, bench
 from crosscheck.timing.benchmark_json import benchmark_document
