@@ -1,4 +1,4 @@
-"""The picture of the tour: speed against accuracy of all codes in the canonical cases.
+"""The picture and the table of the tour: speed against accuracy of all codes in the canonical cases.
 
     python -m tests.repo.front records.jsonl   # keep the figures of a session, and draw them
     python -m tests.repo.front                 # draw those that are kept
@@ -19,12 +19,13 @@ from crosscheck.judging.results import Session, collect
 from crosscheck.records.archive import read
 from crosscheck.records.session import standing
 from crosscheck.report.places import places
-from crosscheck.report.speed import ChartOfCase, fastest, speed_view
+from crosscheck.report.speed import LEVELS, ChartOfCase, fastest, speed_view
 from tests.repo.project import ROOT
 
 KEPT = ROOT / "docs" / "pictures" / "speed.json"
 PICTURE = ROOT / "docs" / "pictures" / "speed.svg"
 PLACES = {"docs/tour.md": "pictures/speed.svg"}  # where it is shown
+BEGIN, END = "<!-- written by tests.repo.front -->\n", "<!-- end -->\n"  # of the table on these pages
 EXPONENTS = range(-1, -13, -1)
 COLOURS = {
     "native": "#0072b2", "pinocchio": "#d55e00", "mujoco": "#009e73", "exudyn": "#b07a00", "exudyn-beam": "#b8609a",
@@ -127,6 +128,27 @@ def picture(front: Front) -> str:
     return "\n".join([*lines, "</svg>", ""])
 
 
+def table(front: Front) -> str:
+    """The medians of the picture in Markdown, a line for each code and a column for each of `LEVELS`."""
+    lines = [
+        f"| code | charts |{''.join(f' {_power(round(np.log10(level)))} |' for level in LEVELS)}",
+        f"|---|---|{'---|' * len(LEVELS)}",
+    ]
+    for curve in front.curves:
+        found = {round(np.log10(error)): time for time, error in curve.medians}
+        cells = (found.get(round(np.log10(level))) for level in LEVELS)
+        times = "".join(" – |" if time is None else f" {float(f'{time:.2g}'):g} × |" for time in cells)
+        lines.append(f"| {NAMES[curve.engine]} | {curve.charts} |{times}")
+    return "\n".join([*lines, ""])
+
+
+def with_table(page: str, front: Front) -> str:
+    """A page with the table between its marks."""
+    before, _, rest = page.partition(BEGIN)
+    _, _, after = rest.partition(END)
+    return f"{before}{BEGIN}\n{table(front)}\n{END}{after}"
+
+
 def _curve_lines(curve: Curve, at: Callable[[float, float], tuple[float, float]], top: float) -> list[str]:
     colour = COLOURS[curve.engine]
     points = [at(time, error) for time, error in curve.runs if error <= 10.0**top]
@@ -153,7 +175,10 @@ def main(records: list[str]) -> None:
     for file in records:
         front = kept(collect(standing(read(Path(file)))))
         KEPT.write_bytes(msgspec.json.encode(front) + b"\n")
-    PICTURE.write_text(picture(msgspec.json.decode(KEPT.read_bytes(), type=Front)), encoding="utf-8")
+    front = msgspec.json.decode(KEPT.read_bytes(), type=Front)
+    PICTURE.write_text(picture(front), encoding="utf-8")
+    for page in PLACES:
+        (ROOT / page).write_text(with_table((ROOT / page).read_text(encoding="utf-8"), front), encoding="utf-8")
 
 
 if __name__ == "__main__":

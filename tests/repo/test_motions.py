@@ -65,4 +65,7 @@ def test_the_first_picture_is_what_the_generator_draws_of_its_figures() -> None:
     assert front.PICTURE.read_text(encoding="utf-8") == front.picture(kept), "run `python -m tests.repo.front`"
     assert {"native", "pinocchio", "mujoco", "exudyn"} <= {curve.engine for curve in kept.curves}
     for page, address in front.PLACES.items():
-        assert f"]({address})" in (ROOT / page).read_text(encoding="utf-8")
+        text = (ROOT / page).read_text(encoding="utf-8")
+        assert f"]({address})" in text
+        assert text == front.with_table(text, kept), "run `python -m tests.repo.front`"
+        assert text != front.with_table(text, msgspec.structs.replace(kept, curves=kept.curves[1:]))

@@ -30,7 +30,7 @@ BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "
 DRIVER = shutil.which("chromedriver")
 pytestmark = pytest.mark.skipif(not (BROWSER and DRIVER), reason="there is no Chromium with chromedriver on the path")
 
-WIDE, NARROW = (1400, 900), (390, 800)
+WIDE, USUAL, NARROW = (1400, 900), (1280, 800), (390, 800)
 PATIENCE_S = 30.0
 HIGHEST = {WIDE: 7000, NARROW: 12000}  # of a page, in pixels; the report of one file was 274000 high
 CONTRASTS = (Path(__file__).parent / "contrasts.js").read_text(encoding="utf-8")
@@ -196,6 +196,25 @@ def test_the_index_shows_speed_against_accuracy_and_leads_to_the_case(
     reader.run("document.querySelector('.overall .plot').emit('plotly_click', {points: [{customdata: arguments[0]}]})",
                "pendulum/single.html#case-0-speed")  # fmt: skip
     reader.wait("return location.hash === '#case-0-speed' && document.readyState === 'complete'")
+    assert reader.errors() == []
+
+
+@pytest.mark.parametrize("where", [".overall", ".work"])
+def test_axis_legend_and_names_of_lines_are_seen_at_once(
+    reader: Reader, many: tuple[SessionOutcome, Path], page: Path, where: str
+) -> None:
+    """In a window of 1280 x 800 pixels whose upper edge is at the heading."""
+    heading = {".overall": "speed", ".work": "case-0-speed"}[where]
+    reader.open(many[1] if where == ".overall" else page, USUAL)
+    reader.run("document.getElementById(arguments[0]).scrollIntoView()", heading)
+    reader.wait(f"return document.querySelector('{where} .plot.drawn') !== null")
+    reader.run("document.getElementById(arguments[0]).scrollIntoView()", heading)
+    for part in (".xtitle", ".ytitle", ".legend"):
+        left, top, right, bottom = reader.run(BOX, f"{where} {part}")
+        assert 0 <= left < right <= USUAL[0] and 0 <= top < bottom <= USUAL[1], part
+    names = reader.run("return [...document.querySelectorAll(arguments[0])].map(each => each.textContent)",
+                       f"{where} .annotation-text")  # fmt: skip
+    assert {"fine", "stepper"} <= {name.split(" ")[0] for name in names}
     assert reader.errors() == []
 
 
