@@ -5,8 +5,9 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Callable
+from functools import partial
 from math import inf, isfinite
-from typing import Any
+from typing import Any, Literal
 
 import msgspec
 import numpy as np
@@ -99,15 +100,14 @@ class _Climb:
         for number, asked in enumerate(self._charted.asked):
             for kind, method, _ in asked.known:
                 tried = self._tried[number, kind, method]
-                why = tune(
-                    lambda value, kind=kind, method=method: self._run(Effort(kind, value, method)),
-                    tried, kind, coarsest[kind], _open(asked), budget, repeats_of,
-                )  # fmt: skip
+                solve = partial(self._run_at, kind, method)
+                why = tune(solve, tried, kind, coarsest[kind], _open(asked), budget, repeats_of)
                 reasons += [f"{asked.observable} by {method} to {why}"] if why else []
         return "; ".join(reasons)
 
-    def _run(self, effort: Effort) -> float:
+    def _run_at(self, kind: Literal["tolerance", "step"], method: str, value: float) -> float:
         """Run an effort, and note its errors in all charts; returns the processor time (s) that it took."""
+        effort = Effort(kind, value, method)
         self._emit(effort.label)
         begin = time.process_time()
         number = len(self.runs) + 1

@@ -170,8 +170,8 @@ function drawWork(node, work) {
   const times = fitted("wall time of the solve, s (compile time apart)", width - left - 12), below = legendHeight(traces, width - left - 12) + 40 + 16 * times.split("<br>").length;
   const across = [work.points.map(wall).reduce((a, b) => Math.min(a, b)), work.points.map(wall).reduce((a, b) => Math.max(a, b))].map(Math.log10);
   const range = [across[0] - 0.1, across[1] + (width < 420 ? 0.1 : 0.12 + 0.15 * (across[1] - across[0]))]; // room for names
-  const ends = width < 420 ? [] : [...groups].map(([key, points]) => [key, points.filter(p => p.error > 0).sort((a, b) => a.error - b.error)[0]])
-    .filter(([, last]) => last).map(([key, last]) => ({ x: Math.log10(wall(last)), y: Math.log10(last.error), text: plain(ofModels ? last.variant : key), colour: tint(last) }));
+  const ends = width < 420 ? [] : [...groups].map(([, points]) => points.filter(p => p.error > 0).sort((a, b) => a.error - b.error)[0])
+    .filter(Boolean).map(last => ({ x: Math.log10(wall(last)), y: Math.log10(last.error), text: plain(ofModels ? last.variant : variants.length > 1 ? `${last.engine} · ${last.variant}` : last.engine), colour: tint(last) }));
   node.style.height = 374 + below + "px";
   Plotly.react(node, traces, layout({
     hovermode: "closest", margin: { l: left, r: 12, t: 26, b: below },
