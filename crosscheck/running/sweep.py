@@ -39,20 +39,23 @@ def sweep(
     limits: Limits = BY_DEFAULT,
     scheduler: Scheduler = run_jobs,
     listener: Listener = lambda jobs, event: None,
-    follow: FollowUp = lambda case, jobs, records: (),
 ) -> None:
     """Run cases, with the runs for their animations, and append to the file `records`.
 
     Recorded runs with the same scene, effort and `made_by` are confirmed and not repeated, unless `fresh`. `asked` are
     the engines (none: all). An engine that exceeds one of the `limits` on a scene is stopped; a case may have its own
-    time limit. `listener` is called with the list of jobs and every event, and `follow` when all jobs of a case have
-    ended. After Ctrl-C or an error of the scheduler
+    time limit. `listener` is called with the list of jobs and every event. After Ctrl-C or an error of the scheduler
     the records are valid, and the next call continues from there.
     """
-    plans = [plan(case, asked, provider, limits.time_s, films=True) for case in cases]
-    run_planned(
-        plans, asked, records, fresh=fresh, limits=limits, scheduler=scheduler, listener=listener, follow=follow
-    )
+    plans = with_films(cases, asked, limits, provider)
+    run_planned(plans, asked, records, fresh=fresh, limits=limits, scheduler=scheduler, listener=listener)
+
+
+def with_films(
+    cases: Iterable[Case], asked: tuple[str, ...], limits: Limits = BY_DEFAULT, provider: str = PROVIDER
+) -> list[tuple[CaseRecord, list[Job]]]:
+    """The plans of cases with the runs for their animations."""
+    return [plan(case, asked, provider, limits.time_s, films=True) for case in cases]
 
 
 def run_planned(
@@ -66,7 +69,7 @@ def run_planned(
     listener: Listener = lambda jobs, event: None,
     follow: FollowUp = lambda case, jobs, records: (),
 ) -> None:
-    """Run planned jobs, as `sweep` does."""
+    """Run planned jobs, as `sweep` does; when all jobs of a case have ended, those that `follow` gives of it too."""
     if fresh:
         records.unlink(missing_ok=True)
     known = read(records) if records.exists() else []

@@ -16,9 +16,10 @@ from crosscheck.records.kinds import ChartRecord, Confirmed
 from crosscheck.records.session import last_session
 from crosscheck.report.speed import meets, speed_tables
 from crosscheck.report.workprecision import work_precision
+from crosscheck.running.sweep import with_films
 from crosscheck.running.tuned import Budget, Tried, tune
 from crosscheck.timing.charted import chart_jobs
-from tests.crosscheck.sessions import copy_case, sweep_here
+from tests.crosscheck.sessions import PROVIDER, copy_case, run_here, sweep_here
 
 RUN_FILE = """
 [[variant]]
@@ -99,8 +100,14 @@ def test_a_budget_is_kept() -> None:
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder: Path = tmp_path_factory.mktemp("charted")
-    sweep_here([load_case(copy_case(folder, RUN_FILE))], (), folder / "records.jsonl", follow=chart_jobs)
+    copy_case(folder, RUN_FILE)
+    charted(folder)
     return folder
+
+
+def charted(folder: Path) -> None:
+    plans = with_films([load_case(folder / "pendulum" / "single")], (), provider=PROVIDER)
+    run_here(plans, (), folder / "records.jsonl", follow=chart_jobs)
 
 
 def results(folder: Path) -> CaseResults:
@@ -150,7 +157,7 @@ def test_judged_results_are_those_of_a_session_without_charts(folder: Path, tmp_
 
 def test_charts_are_confirmed_and_not_run_again(folder: Path) -> None:
     before = results(folder).charted
-    sweep_here([load_case(folder / "pendulum" / "single")], (), folder / "records.jsonl", follow=chart_jobs)
+    charted(folder)
     records = read(folder / "records.jsonl")
     assert sum(isinstance(record, ChartRecord) for record in records) == len(before)
     assert sum(isinstance(record, Confirmed) and record.role == "chart" for record in records) == len(before)
