@@ -149,7 +149,7 @@ def meets(chart: WorkPrecision, point: Point, target: float) -> bool:
 
 
 @dataclass(frozen=True)
-class Cell:
+class ErrorCost:
     """What an error costs: the time (s) of the fastest run that is as accurate, None if none is; `most` where all of
     these are more than ten times as accurate, so that a coarser effort may be faster."""
 
@@ -163,7 +163,7 @@ class SpeedRow:
 
     engine: str
     variant: str
-    cells: tuple[Cell, ...]
+    cells: tuple[ErrorCost, ...]
     why: str
 
 
@@ -193,12 +193,12 @@ def _table(case: CaseResults, chart: WorkPrecision) -> SpeedTable:
     return SpeedTable(chart.title, targets, tuple(rows))
 
 
-def _cell(chart: WorkPrecision, own: Iterable[Point], target: float) -> Cell:
+def _cell(chart: WorkPrecision, own: Iterable[Point], target: float) -> ErrorCost:
     enough = [point for point in own if point.error is not None and point.error <= target and point.wall_s > 0.0]
     if not enough:
-        return Cell(None)
+        return ErrorCost(None)
     met = any(meets(chart, point, target) for point in enough)
-    return Cell(min(point.wall_s for point in enough), not met)
+    return ErrorCost(min(point.wall_s for point in enough), not met)
 
 
 def fastest(chart: WorkPrecision, error: float) -> dict[str, float]:

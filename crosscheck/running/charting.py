@@ -21,7 +21,7 @@ from crosscheck.records.made_by import made_by
 from crosscheck.running.execute import checked, execute, packed
 from crosscheck.running.job import Job
 from crosscheck.running.rung import Solved, repeats_of, solve_rung
-from crosscheck.running.tuned import BUDGET_S, LOOSEST, Asked, Budget, Charted, Tried, tune
+from crosscheck.running.tuned import BUDGET_S, LOOSEST, Asked, Charted, ProcessorBudget, TriedEffort, tune
 from flexmb.run.channels import distance
 
 HERE = ("crosscheck.running.charting", "crosscheck.running.tuned")  # what determines the runs, besides the engine
@@ -95,7 +95,7 @@ class _Climb:
 
     def all(self) -> str:
         """Tune every method for every observable; returns what was not reached, and why."""
-        times, reasons, budget = self._job.times, [], Budget()
+        times, reasons, budget = self._job.times, [], ProcessorBudget()
         coarsest = {"tolerance": LOOSEST, "step": float(np.min(np.diff(times)))}  # all of them stop at every sample
         for number, asked in enumerate(self._charted.asked):
             for kind, method, _ in asked.known:
@@ -118,7 +118,7 @@ class _Climb:
         for number, asked in enumerate(self._charted.asked):
             tried = self._tried.get((number, effort.kind, effort.method))
             if tried is not None:
-                tried.append(Tried(effort.value, _error(solved, asked), max(solved.record.cpu_s, 1e-9)))
+                tried.append(TriedEffort(effort.value, _error(solved, asked), max(solved.record.cpu_s, 1e-9)))
         return took_s
 
 

@@ -81,7 +81,7 @@ def run_planned(
         work, jobs, str(records.with_suffix(".log")), limits.workers, library, _time_limit, limits.memory_bytes
     )
     doing: dict[int, str] = {}
-    found = _Found(plans, known)
+    found = _RecordsOfCases(plans, known)
     with (
         closing(Archive(records)) as archive,
         closing(scheduler(whole)) as events,
@@ -107,7 +107,7 @@ def run_planned(
                 jobs += follow(*ended)
 
 
-class _Found:
+class _RecordsOfCases:
     """What the jobs of each case have recorded or confirmed, until all of them have ended."""
 
     def __init__(self, plans: Sequence[tuple[CaseRecord, list[Job]]], known: Sequence[Record]) -> None:

@@ -26,7 +26,7 @@ FURTHEST = {"tolerance": 100.0, "step": 8.0}  # ratio of values in one extrapola
 DEARER = {"tolerance": 0.25, "step": 1.0}  # p of time ~ value^-p
 
 
-class Tried(NamedTuple):
+class TriedEffort(NamedTuple):
     """An effort's value, the error of its run (infinite if it failed) and what it took of a processor (s)."""
 
     value: float
@@ -44,7 +44,7 @@ class Asked:
     values: Real
     scale: float
     doubt: float
-    known: tuple[tuple[Literal["tolerance", "step"], str, tuple[Tried, ...]], ...]
+    known: tuple[tuple[Literal["tolerance", "step"], str, tuple[TriedEffort, ...]], ...]
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Charted:
 
 
 @dataclass
-class Budget:
+class ProcessorBudget:
     """Seconds that are left for further runs."""
 
     left_s: float = BUDGET_S
@@ -67,11 +67,11 @@ class Budget:
 
 def tune(
     solve: Callable[[float], float],
-    tried: list[Tried],
+    tried: list[TriedEffort],
     kind: Literal["tolerance", "step"],
     coarsest: float,
     targets: Sequence[float],
-    budget: Budget,
+    budget: ProcessorBudget,
     repeats: Callable[[float], int] = lambda seconds: 1,
 ) -> str:
     """Try efforts of one method until the targets are met, and add them to `tried`; returns why some are not.
@@ -97,7 +97,7 @@ def tune(
 
 
 def _next(
-    tried: Sequence[Tried], target: float, kind: Literal["tolerance", "step"], coarsest: float
+    tried: Sequence[TriedEffort], target: float, kind: Literal["tolerance", "step"], coarsest: float
 ) -> float | str:
     """The value to try next for a target, or why there is none."""
     aim = target / sqrt(WITHIN)
@@ -113,7 +113,7 @@ def _next(
     return _finer(tried, kind, aim)
 
 
-def _between(fine: Tried, coarse: Tried, aim: float) -> float | str:
+def _between(fine: TriedEffort, coarse: TriedEffort, aim: float) -> float | str:
     """By error ~ value^p between two efforts, and not too near to either of them."""
     if coarse.value <= APART * fine.value:
         return "there is no effort between one that errs by less and one that errs by more"
@@ -123,7 +123,7 @@ def _between(fine: Tried, coarse: Tried, aim: float) -> float | str:
     return _short(fine.value * (coarse.value / fine.value) ** part)
 
 
-def _finer(tried: Sequence[Tried], kind: Literal["tolerance", "step"], aim: float) -> float | str:
+def _finer(tried: Sequence[TriedEffort], kind: Literal["tolerance", "step"], aim: float) -> float | str:
     """Beyond the finest effort, unless its error is no longer that of its method."""
     finest, *others = sorted(tried)
     if others and finest.error * 1.5 > others[0].error and others[0].value > 1.5 * finest.value:
@@ -134,7 +134,7 @@ def _finer(tried: Sequence[Tried], kind: Literal["tolerance", "step"], aim: floa
     return _short(max(finest.value / factor, TIGHTEST if kind == "tolerance" else 0.0))
 
 
-def _factor(tried: Sequence[Tried], kind: Literal["tolerance", "step"], ratio: float) -> float:
+def _factor(tried: Sequence[TriedEffort], kind: Literal["tolerance", "step"], ratio: float) -> float:
     """The ratio of values that changes the error by `ratio`, from the two efforts whose errors are largest."""
     least, usual, largest = ORDERS[kind]
     known = sorted((each for each in tried if 0.0 < each.error < inf), reverse=True)[:2]
@@ -145,7 +145,7 @@ def _factor(tried: Sequence[Tried], kind: Literal["tolerance", "step"], ratio: f
     return FURTHEST[kind] if ratio == inf else min(max(ratio ** (1.0 / order), 1.2), FURTHEST[kind])
 
 
-def _expected_s(tried: Sequence[Tried], value: float, kind: Literal["tolerance", "step"]) -> float:
+def _expected_s(tried: Sequence[TriedEffort], value: float, kind: Literal["tolerance", "step"]) -> float:
     """The time of a run, from the effort that is nearest to it."""
     nearest = min(tried, key=lambda each: abs(log(each.value / value)))
     return nearest.cpu_s * float((nearest.value / value) ** DEARER[kind])

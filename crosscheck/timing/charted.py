@@ -18,7 +18,7 @@ from crosscheck.judging.chart_reference import ChartReference, chart_reference
 from crosscheck.judging.results import CaseResults, Result, collect
 from crosscheck.records.kinds import CHART, CaseRecord, Record
 from crosscheck.running.job import MAIN, Job
-from crosscheck.running.tuned import Asked, Charted, Tried
+from crosscheck.running.tuned import Asked, Charted, TriedEffort
 
 CHART_LIMIT_S = 120.0  # of a job that is expected to spend `BUDGET_S`: what takes so long hangs
 
@@ -68,7 +68,7 @@ def _asked(result: Result, observable: str, reference: ChartReference) -> Asked 
 
 def _known(
     result: Result, observable: str, reference: ChartReference
-) -> Iterator[tuple[Literal["tolerance", "step"], str, tuple[Tried, ...]]]:
+) -> Iterator[tuple[Literal["tolerance", "step"], str, tuple[TriedEffort, ...]]]:
     """The runs that are judged, of each method one that finished at least."""
     methods = dict.fromkeys((run.effort_kind, run.effort_method) for run in result.runs if run.effort)
     for kind, method in methods:
@@ -78,6 +78,6 @@ def _known(
                 finished = run.status == "finished" and observable in run.channels
                 error = reference.error(result, observable, run) if finished else None
                 error = error if error is not None and isfinite(error) else inf
-                tried.append(Tried(run.effort_value, error, max(run.cpu_s or run.wall_s, 1e-9)))
+                tried.append(TriedEffort(run.effort_value, error, max(run.cpu_s or run.wall_s, 1e-9)))
         if any(each.error < inf for each in tried):
             yield ("tolerance" if kind == "tolerance" else "step"), method, tuple(tried)

@@ -17,7 +17,7 @@ from crosscheck.records.session import last_session
 from crosscheck.report.speed import meets, speed_tables
 from crosscheck.report.workprecision import work_precision
 from crosscheck.running.sweep import with_films
-from crosscheck.running.tuned import Budget, Tried, tune
+from crosscheck.running.tuned import ProcessorBudget, TriedEffort, tune
 from crosscheck.timing.charted import chart_jobs
 from tests.crosscheck.sessions import PROVIDER, copy_case, run_here, sweep_here
 
@@ -41,9 +41,9 @@ class Method:
         self.tried = [self.run(1e-3), self.run(5e-4)]
         self.count = 0
 
-    def run(self, value: float) -> Tried:
+    def run(self, value: float) -> TriedEffort:
         error = inf if value > self.unstable else self.factor * value**self.order
-        return Tried(value, error, max(self.second / value, 1e-9))
+        return TriedEffort(value, error, max(self.second / value, 1e-9))
 
     def solve(self, value: float) -> float:
         self.count += 1
@@ -51,7 +51,7 @@ class Method:
         return self.tried[-1].cpu_s
 
     def tune(self, targets: tuple[float, ...] = TARGETS, coarsest: float = 1e3, left_s: float = 1.0) -> str:
-        return tune(self.solve, self.tried, "step", coarsest, targets, Budget(left_s))
+        return tune(self.solve, self.tried, "step", coarsest, targets, ProcessorBudget(left_s))
 
     def unmet(self, targets: tuple[float, ...] = TARGETS) -> list[float]:
         return [target for target in targets if not any(is_met(each.error, target) for each in self.tried)]
