@@ -113,7 +113,7 @@ All keys, with defaults in brackets; the structs below explain them:
   ``engines`` [the variant's, less ``also``]; ``scale`` [the largest magnitude] (SI); ``expect``, ``band`` (for it all),
   ``diverged_s``, ``because`` and ``reason``, as above;
 - ``open``: ``channels``, patterns; ``variants`` [all]; ``engines`` [all of these]; ``reason``;
-- ``chart``: ``title`` [the observable's]; ``observable``; ``variants``; ``reference``;
+- ``chart``: ``title`` [the observable's]; ``observable``; ``variants``; ``reference``; ``engines`` [all];
 - ``reference``: what ``reference.csv`` holds and how it is made, explained in `crosscheck.library.recipe`.
 
 ``library/check`` has the rules: all numbers finite and in their ranges, names unique, patterns of kinds of channels

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crosscheck.judging.results import CaseResults, collect
+from crosscheck.library.case_error import CaseError
 from crosscheck.library.efforts import TARGETS, is_met
 from crosscheck.library.find import load_case
 from crosscheck.records.archive import read
@@ -163,3 +164,14 @@ def test_charts_are_confirmed_and_not_run_again(folder: Path) -> None:
     assert sum(isinstance(record, Confirmed) and record.role == "chart" for record in records) == len(before)
     assert results(folder).charted == before
     np.testing.assert_equal(len(met(results(folder), "stepper")) >= 6, True)
+
+
+def test_a_chart_of_some_engines_shows_and_tunes_no_others(tmp_path: Path) -> None:
+    copy_case(tmp_path, RUN_FILE + 'engines = ["stepper"]\n')
+    charted(tmp_path)
+    case = results(tmp_path)
+    chart = work_precision(case, case.case.run.charts[0])
+    assert chart is not None and {point.engine for point in chart.points} == {"stepper"}
+    assert list(case.charted) == [("rigid", "stepper")]
+    with pytest.raises(CaseError, match="runs none of the chart's variants"):
+        load_case(copy_case(tmp_path / "wrong", RUN_FILE + 'engines = ["refuser"]\n'))
