@@ -205,14 +205,14 @@ def _run(
 ) -> None:  # fmt: skip
     """Run the cases; until they are judged the outputs say that the session is unfinished."""
     from crosscheck.report import mark_unfinished
-    from crosscheck.running.sweep import run_planned, with_films
+    from crosscheck.running.sweep import sweep
     from crosscheck.terminal.progress import LiveProgress
     from crosscheck.timing.charted import chart_jobs
 
     mark_unfinished(records, records.parent)
     with LiveProgress(common.console, shown) as live:
-        run_planned(
-            with_films(cases, engines, limits), engines, records,
+        sweep(
+            cases, engines, records,
             fresh=fresh, limits=limits, scheduler=scheduler, listener=live.hear, follow=chart_jobs,
         )  # fmt: skip
 

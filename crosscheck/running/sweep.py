@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
+from typing import TypedDict, Unpack
 
 import msgspec
 
@@ -29,16 +30,23 @@ FollowUp = Callable[[CaseRecord, Sequence[Job], Sequence[Record]], Sequence[Job]
 """Further jobs of a case, from its jobs and what all of them have recorded."""
 
 
+class How(TypedDict, total=False):
+    """Options of `run_planned` that `sweep` has too."""
+
+    fresh: bool
+    scheduler: Scheduler
+    listener: Listener
+    follow: FollowUp
+
+
 def sweep(
     cases: Iterable[Case],
     asked: tuple[str, ...],
     records: Path,
     *,
-    fresh: bool = False,
     provider: str = PROVIDER,
     limits: Limits = BY_DEFAULT,
-    scheduler: Scheduler = run_jobs,
-    listener: Listener = lambda jobs, event: None,
+    **how: Unpack[How],
 ) -> None:
     """Run cases, with the runs for their animations, and append to the file `records`.
 
@@ -47,15 +55,8 @@ def sweep(
     time limit. `listener` is called with the list of jobs and every event. After Ctrl-C or an error of the scheduler
     the records are valid, and the next call continues from there.
     """
-    plans = with_films(cases, asked, limits, provider)
-    run_planned(plans, asked, records, fresh=fresh, limits=limits, scheduler=scheduler, listener=listener)
-
-
-def with_films(
-    cases: Iterable[Case], asked: tuple[str, ...], limits: Limits = BY_DEFAULT, provider: str = PROVIDER
-) -> list[tuple[CaseRecord, list[Job]]]:
-    """The plans of cases with the runs for their animations."""
-    return [plan(case, asked, provider, limits.time_s, films=True) for case in cases]
+    plans = [plan(case, asked, provider, limits.time_s, films=True) for case in cases]
+    run_planned(plans, asked, records, limits=limits, **how)
 
 
 def run_planned(

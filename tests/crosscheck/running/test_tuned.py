@@ -17,10 +17,9 @@ from crosscheck.records.kinds import ChartRecord, Confirmed
 from crosscheck.records.session import last_session
 from crosscheck.report.speed import meets, speed_tables
 from crosscheck.report.workprecision import work_precision
-from crosscheck.running.sweep import with_films
 from crosscheck.running.tuned import ProcessorBudget, TriedEffort, tune
 from crosscheck.timing.charted import chart_jobs
-from tests.crosscheck.sessions import PROVIDER, copy_case, run_here, sweep_here
+from tests.crosscheck.sessions import copy_case, sweep_here
 
 RUN_FILE = """
 [[variant]]
@@ -107,8 +106,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def charted(folder: Path) -> None:
-    plans = with_films([load_case(folder / "pendulum" / "single")], (), provider=PROVIDER)
-    run_here(plans, (), folder / "records.jsonl", follow=chart_jobs)
+    sweep_here([load_case(folder / "pendulum" / "single")], (), folder / "records.jsonl", follow=chart_jobs)
 
 
 def results(folder: Path) -> CaseResults:
