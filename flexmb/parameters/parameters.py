@@ -293,8 +293,8 @@ def parameters(plant: Plant, names: Sequence[str]) -> Parameters:
 
 _OF_TABLES = {
     "tree.body.point_start": (
-        "how many points of a beam of level \"exact\" its default is, or a part of the beam takes, depends on it; give the "
-        "beam `points`, or leave it whole by cuts = []"
+        'how many points of a beam of level "exact" there are, or in a part of the beam, depends on it; give the beam '
+        "`points`, or leave it whole by cuts = []"
     ),
     "tree.body.planar": (
         'it bends a beam of level "exact", whose strains are in one plane, out of that plane; give the beam torsion '
