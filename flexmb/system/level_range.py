@@ -17,6 +17,7 @@ from flexmb.building.links import BodyLink
 from flexmb.hinges.catalogue import KINDS
 from flexmb.modal.integrals import modal_integrals
 from flexmb.scene.bodies import BeamBody
+from flexmb.system.moved_sections import cross
 from flexmb.system.system import System
 from flexmb.tables.arrays import ANGULAR_Z
 from flexmb.typing import Flags, Real
@@ -76,12 +77,12 @@ def of_runs(systems: Sequence[System], t: Real, size: Real, turns: Callable[[int
     watched = sorted({k for system in systems for k in _firsts(system)})
     firsts = np.array([[_firsts(system).get(k, np.inf) for k in watched] for system in systems])
     allowed = np.sqrt(ALLOWED) * firsts
+    arms = _all_arms(systems, watched)
     fastest, at = np.zeros(firsts.shape), np.zeros(firsts.shape, np.int64)
     for n in range(size.shape[1]):
         if not np.any(size[:, n, None] > (1.0 + ROUNDING) * np.maximum(fastest, 1.0)):
             break
-        w = turns(n)
-        rate = np.column_stack([_across(systems, k, w[:, k]) for k in watched]) / allowed
+        rate = _across(turns(n)[:, watched], arms) / allowed
         faster = rate > fastest
         fastest[faster], at[faster] = rate[faster], n
     found: list[list[TooFast]] = [[] for _ in systems]
@@ -106,7 +107,7 @@ def weights(system: System) -> Real:
             while at >= 0:
                 place, kind = int(body["u_index"][at]), KINDS[body["hinge_kind"][at]]
                 is_own_axis = at == k and body["axis"][at] == ANGULAR_Z
-                part = float(_across([system], k, np.eye(3)[2:])[0]) if is_own_axis else 1.0
+                part = float(_across(np.eye(3)[2], _arms(system, k))) if is_own_axis else 1.0
                 for n in set(range(body["nv"][at])) - set(kind.displacements):
                     found[place + n] = max(found[place + n], part / (np.sqrt(ALLOWED) * first))
                 at = int(body["parent"][at])
@@ -152,11 +153,22 @@ def _first(link: BodyLink) -> float:
     return float(np.sqrt(max(chosen.min(initial=np.inf), 0.0))) if len(chosen) else 0.0
 
 
-def _across(systems: Sequence[System], k: int, w: Real) -> Real:
-    """The part (R,) of a body's angular velocities w (R,3) rad/s that pulls at its points along their distances."""
-    arms = [_arms(system, k) for system in systems]
-    r = np.array(arms) if len({id(each) for each in arms}) > 1 else arms[0][None]
-    return np.max(np.linalg.norm(np.cross(w[:, None], r), axis=2), axis=1, initial=0.0)
+def _across(w: Real, arms: Real) -> Real:
+    """The parts (...) of angular velocities w (...,3) rad/s that pull at points along their distances (...,P,3)."""
+    return np.asarray(np.max(np.linalg.norm(cross(w[..., None, :], arms), axis=-1), axis=-1, initial=0.0))
+
+
+def _all_arms(systems: Sequence[System], watched: Sequence[int]) -> Real:
+    """The arms (R,K,P,3) of these bodies, with zeros behind those that have fewer points; one row where all share
+    them."""
+    rows = [[_arms(system, k) for k in watched] for system in systems]
+    if all(one is other for row in rows for one, other in zip(row, rows[0], strict=True)):
+        rows = rows[:1]
+    arms = np.zeros((len(rows), len(watched), max((len(each) for row in rows for each in row), default=0), 3))
+    for place, row in zip(arms, rows, strict=True):
+        for own, each in zip(place, row, strict=True):
+            own[: len(each)] = each
+    return arms
 
 
 def _arms(system: System, k: int) -> Real:

@@ -44,14 +44,14 @@ def moved_sections(field: StrainField, eta: Real, etad: Real, etadd: Real) -> Mo
             continue
         more = R[i] @ spin[j]
         R[j], omega[j] = R[i] @ step[j], omega[i] + more
-        alpha[j] = alpha[i] + np.cross(omega[i], more) + R[i] @ spin_rate[j]
+        alpha[j] = alpha[i] + cross(omega[i], more) + R[i] @ spin_rate[j]
     at, at_rest = field.gauss, field.tangent[field.gauss]
     w = omega[at]
     tangent, stretching, again = (
         np.einsum("nab,nb->na", R[at], vector) for vector in (at_rest + g[at], g_rate[at], g_again[at])
     )
-    turned = np.cross(w, tangent)
-    bent = np.cross(alpha[at], tangent) + np.cross(w, turned + 2.0 * stretching) + again
+    turned = cross(w, tangent)
+    bent = cross(alpha[at], tangent) + cross(w, turned + 2.0 * stretching) + again
     return MovedSections(
         r=field.position + field.weight @ (tangent - at_rest),
         v=field.weight @ (turned + stretching),
@@ -60,6 +60,12 @@ def moved_sections(field: StrainField, eta: Real, etad: Real, etadd: Real) -> Mo
         omega=omega,
         alpha=alpha,
     )
+
+
+def cross(a: Real, b: Real) -> Real:
+    """a x b of rows (...,3): a third of the time that NumPy's takes for few of them."""
+    x, y = a[..., [1, 2, 0]], b[..., [2, 0, 1]]
+    return np.asarray(x * y - a[..., [2, 0, 1]] * b[..., [1, 2, 0]])
 
 
 def _magnus(whole: _Rates, linear: _Rates, square: _Rates) -> _Rates:
@@ -79,7 +85,7 @@ def _sum(x: _Rates, y: _Rates, factor: float) -> _Rates:
 def _cross(x: _Rates, y: _Rates) -> _Rates:
     """x x y by Leibniz' rule."""
     return (
-        np.cross(x[0], y[0]),
-        np.cross(x[1], y[0]) + np.cross(x[0], y[1]),
-        np.cross(x[2], y[0]) + 2.0 * np.cross(x[1], y[1]) + np.cross(x[0], y[2]),
+        cross(x[0], y[0]),
+        cross(x[1], y[0]) + cross(x[0], y[1]),
+        cross(x[2], y[0]) + 2.0 * cross(x[1], y[1]) + cross(x[0], y[2]),
     )

@@ -24,7 +24,7 @@ from flexmb.scene.problems import SceneWarning
 from flexmb.scene.sections import ABOUT_Y, ABOUT_Z, EXTENSION, TWIST
 from flexmb.scene.tree import place_along
 from flexmb.system.frames import MotionTables, Pose, body_pose, closure_frames_of, hinge_frames_of, link_pose
-from flexmb.system.moved_sections import moved_sections
+from flexmb.system.moved_sections import cross, moved_sections
 from flexmb.system.observables import Evaluation
 from flexmb.system.scene_arrays import SceneArrays
 from flexmb.system.turning_points import rotation_along, turning
@@ -201,17 +201,17 @@ class SectionBalance:
         points = self.sections.points
         w, alpha, a = motion
         r = moved.r
-        acceleration = a + np.cross(alpha, r) + np.cross(w, np.cross(w, r)) + 2.0 * np.cross(w, moved.v) + moved.a
+        acceleration = a + cross(alpha, r) + cross(w, cross(w, r)) + 2.0 * cross(w, moved.v) + moved.a
         torque = np.zeros_like(r)
         if np.any(points.com_offset) or np.any(points.inertia):
-            R, omega, turn = moved.R, w + moved.omega, alpha + moved.alpha + np.cross(w, moved.omega)
+            R, omega, turn = moved.R, w + moved.omega, alpha + moved.alpha + cross(w, moved.omega)
             arm = np.einsum("nab,nb->na", R, points.com_offset)
             J = R @ points.inertia @ np.swapaxes(R, 1, 2)
             r = r + arm
-            acceleration = acceleration + np.cross(turn, arm) + np.cross(omega, np.cross(omega, arm))
-            torque = np.einsum("nab,nb->na", J, turn) + np.cross(omega, np.einsum("nab,nb->na", J, omega))
+            acceleration = acceleration + cross(turn, arm) + cross(omega, cross(omega, arm))
+            torque = np.einsum("nab,nb->na", J, turn) + cross(omega, np.einsum("nab,nb->na", J, omega))
         force = points.mass[:, None] * acceleration
-        return np.asarray(self.sections.share @ np.hstack([np.cross(r, force) + torque, force]))
+        return np.asarray(self.sections.share @ np.hstack([cross(r, force) + torque, force]))
 
     def _outer(self, w: MotionTables, pose: Pose, exerted: Evaluation) -> list[_Outer]:
         """All loads on the beam, with their places along it."""
@@ -223,7 +223,7 @@ class SectionBalance:
         def add(node: str, torque: Real, force: Real, point: Real, *, at: bool = True) -> None:
             x = place_along(self._beam, node)
             beyond = int(np.searchsorted(self._cuts, x, side="right" if at else "left"))
-            about = torque + np.cross(point - pose.position, force)
+            about = torque + cross(point - pose.position, force)
             outer.append(_Outer(beyond, np.concatenate([pose.rotation.T @ about, pose.rotation.T @ force])))
 
         own = arrays.links[k]
@@ -276,7 +276,7 @@ def _motion_in(pose: Pose, link: Pose, w: MotionTables, k: int) -> _Motion:
     turn = pose.rotation.T @ link.rotation
     r = link.rotation.T @ (pose.position - link.position)
     omega, (alpha, a) = w.body["velocity"][k, :3], w.body["accel"][k].reshape(2, 3)
-    at_origin = a + np.cross(alpha, r) + np.cross(omega, np.cross(omega, r))
+    at_origin = a + cross(alpha, r) + cross(omega, cross(omega, r))
     return _Motion(turn @ omega, turn @ alpha, turn @ at_origin)
 
 
@@ -311,7 +311,7 @@ def _moved(s: BeamSections, eta: Real, etad: Real, etadd: Real) -> tuple[_Moved,
 
 def _in_sections(wrench: Real, axis: Real, R: Real) -> Real:
     """Wrenches (X,6) about the body's origin in body axes, referred to sections at `axis` (X,3) with axes R (X,3,3)."""
-    torque = wrench[:, :3] - np.cross(axis, wrench[:, 3:])
+    torque = wrench[:, :3] - cross(axis, wrench[:, 3:])
     return np.hstack([np.einsum("nba,nb->na", R, vector) for vector in (torque, wrench[:, 3:])])
 
 

@@ -14,6 +14,7 @@ from rich.console import Console
 import flexmb as fm
 from crosscheck.library.case import CaseError
 from crosscheck.library.reference import digest, load_reference
+from crosscheck.report.maps import MapShown, read_maps
 from crosscheck.sampling.run import run_sweep
 from crosscheck.sealed.compare import compare_results
 from crosscheck.sealed.seal import ResultsError, read_results, sealed_text
@@ -70,6 +71,7 @@ def of_sessions(folder: Path) -> dict[str, Kind]:
     sealed = (*mutate.BYTES, mutate.string, mutate.number, *[mutate.seal_anew] * 6)
     table = (*mutate.TEXT, mutate.lines, *[mutate.cells] * 4)
     archive = (*mutate.BYTES[:3], *[mutate.members] * 6)
+    words = (*mutate.BYTES, mutate.string, mutate.number)
     return {
         "results": Kind("results.json", (results,), sealed, (ResultsError,), _results),
         "sweep": Kind("sweep.toml", _sweeps(), mutate.TOML, (CaseError,), _sweep),
@@ -78,6 +80,7 @@ def of_sessions(folder: Path) -> dict[str, Kind]:
         "measured set": Kind("measured.toml", tuple(sets), mutate.TOML, (CaseError,), _measured),
         "measured points": Kind("points.csv", tuple(points), table, (CaseError,), _points),
         "restart": Kind("restart.npz", _restarts(folder), archive, (ValueError,), _restart),
+        "maps": Kind("maps.json", _map_files(folder), words, (ValueError,), _maps),
     }
 
 
@@ -111,6 +114,25 @@ def _restarts(folder: Path) -> tuple[bytes, ...]:
         found.append((folder / "seed.npz").read_bytes())
     (folder / "seed.npz").unlink()
     return tuple(found)
+
+
+def _map_files(folder: Path) -> tuple[bytes, ...]:
+    """What `crosscheck stability` leaves of two maps, one of which has a picture."""
+    (folder / "growth.svg").write_text("<svg/>")
+    shown = [
+        MapShown(map=name, title="Growth", status="agree", worst="1e-6", cells={"agree": 9}, overlay="poles", source="")
+        for name in ("growth", "decay")
+    ]
+    return (msgspec.json.encode(shown),)
+
+
+def _maps(path: Path) -> str | None:
+    """A report says why maps cannot be read, and is written without them."""
+    found = read_maps(path.parent)
+    if found.error:
+        raise ValueError(found.error)
+    said = [each["map"] for each in json.loads(path.read_bytes())]
+    return None if said == [each.map for each in found.maps] else "other maps than the file has"
 
 
 def _results(path: Path) -> str | None:

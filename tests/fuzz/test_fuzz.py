@@ -130,6 +130,7 @@ PRIMITIVES = re.compile(
 """Calls that turn a file or its text into values."""
 NOT_OF_USERS = {
     "crosscheck/cli/baseline.py:hold_against": "copies what `read_finished` has read",
+    "crosscheck/cli/label.py:label": "shows what it has just computed",
     "crosscheck/cli/run.py:_conclude": "shows what it has just written",
     "crosscheck/cli/stability.py:stability": "shows what it has just written",
     "crosscheck/engines/kratos/library.py:_silence": "the file that takes everything",
@@ -152,6 +153,9 @@ NOT_OF_USERS = {
     "crosscheck/running/processes.py:memory_limit": "the kernel's words on memory",
     "crosscheck/sampling/printed.py": "scenes of cases that are read before, with other numbers",
     "crosscheck/running/worker.py:_serve": "a log, and nothing",
+    "crosscheck/sealed/stamp.py:add_stamped": "replaces what is no table, and says nothing of it",
+    "crosscheck/sealed/stamp.py:stamped": "what it has just encoded",
+    "crosscheck/stability/map_records.py:identity": "a digest",
     "flexmb/control/lookup.py": "sources of users' functions, which are run anyhow",
     "flexmb/export/sources.py:_shared": "files of the package",
     "flexmb/export/writing.py:_library": "what the compiler has just written",

@@ -110,7 +110,8 @@ def draw(asked: list[Problem], kept: Fronts) -> None:
     drawn = StringIO()
     figure.savefig(drawn, format="svg", metadata={"Date": None})
     short = re.sub(r"<!--.*?-->| id=\"[a-z.0-9]+_[0-9]+\"", "", drawn.getvalue())  # names that nothing uses
-    PICTURE.write_text(re.sub(r"\n\s+", "\n", short), encoding="utf-8")
+    rounded = re.sub(r"(\d\.\d\d)\d+", r"\1", short)  # a hundredth of a point is not seen
+    PICTURE.write_text(re.sub(r"\n\s+", "\n", rounded), encoding="utf-8")
 
 
 def _panel(axes: Axes, problem: Problem, found: dict[str, list[Point]]) -> None:

@@ -65,4 +65,43 @@ REASONS = (
         "lie in the cache, a hundred thousand stream from memory, which at its 12 GB/s takes 250 ns. Records asked "
         "for ahead of their turn hide a part. The faster the kernel, the larger the ratio.",
     ),
+    Reason(
+        ("kernel_10", "kernel_50", "kernel_100"),
+        "this row calls `rhs` with general kernels, which hold modes and all levels; evaluators, explicit runs and "
+        "batches of rigid trees take kernels without these (rows `python_*`, 1.3 to 1.6 times as fast). Special ones "
+        "met it on another processor: 3.6 to 3.7.",
+    ),
+    Reason(
+        ("python_forward_100", "batch_aba", "batch_parallel", "rk4", "derivatives_python_10", "jacobian_5_modes",
+         "jacobian_10_modes", "modes_ruthless_5", "exact_soromox"),
+        "special kernels met it on another processor (8.3, 22, 17, 3.0, 2.7, 7.7, 10.4, 5.3 and 34). By default, kinds "
+        "of hinges, connectors and levels that a scene lacks are tested for in each body, and cost most in lanes and "
+        "where a body takes little (docs/kernels.md). What computes for ten seconds gets special kernels by itself.",
+    ),
+    Reason(
+        ("call_derivatives_chain", "call_derivatives_loop", "call_linearize_chain", "call_linearize_loop"),
+        "the goal is of a machine on which Python takes half of the time. Of 0.7 ms of `linearize` of the four-bar the "
+        "kernels take 30 µs; two fifths are its variations in Python (a singular value decomposition, two triangular "
+        "systems, some sixty small products), a fifth examines and closes the state, a tenth are markers.",
+    ),
+    Reason(
+        ("sensitivity_1",),
+        "a dual number holds seven derivatives: by one number the equations cost what they cost by seven, 2.7 times "
+        "those of the motion, beside the run itself. Narrower duals would be a second set of kernels.",
+    ),
+    Reason(
+        ("ffrf_beam_0.01", "ffrf_beam_0.001", "ffrf_beam_0.0001"),
+        "13.8, 32 and 61 by special kernels on another processor, before runs looked at every step for turns beyond "
+        "their level and for what is left out: in a run of 2 ms that look takes about as long as its steps.",
+    ),
+    Reason(
+        ("exact_coarse",),
+        "40 steps take 4 ms; the rest is the watch of the stretch that is held, which forms the loads in sections of "
+        "four beams in eight states in Python (60 ms before it kept its tables, 13 now).",
+    ),
+    Reason(
+        ("readme_warm",),
+        "0.8 s on another processor. Python's imports, of which numba's are half, and of NumPy and SciPy, take it; no "
+        "kernel is compiled.",
+    ),
 )

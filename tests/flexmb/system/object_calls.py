@@ -170,6 +170,8 @@ def _of_runs(w: World) -> Calls:
               lambda it: [each.greatest for name, _, each in it.channels if not name.endswith("]")])  # fmt: skip
     found.add("Envelope.to_csv", lambda: written(run.envelope.to_csv, "envelope.csv"))
     found.add("Trajectory.loads_in, outboard", lambda: run.loads_in("outboard"))
+    hinge = tree.scene.hinges[0]
+    found.add("Trajectory.total_load", lambda: run.total_load([hinge.name], hinge.child))
     found.add("Trajectory.section_loads", lambda: run.section_loads("arm", [0.0, 0.25]))
     found.add("Trajectory.state_at", lambda: run.state_at(1))
     found.add("Trajectory.values_at", lambda: run.values_at(1))
