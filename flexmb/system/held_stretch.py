@@ -83,7 +83,7 @@ def unstretched(system: System, t: Real, q: Real, u: Real, loads: Mapping[str, R
         findings: list[Unstretched] = []
         for n in order:
             shown = zip(findings, suspects[order], strict=False)
-            share = max((each.size / bound for each, bound in shown), default=1.0)
+            share = max((each.size / bound if np.isfinite(bound) else 1.0 for each, bound in shown), default=1.0)
             if min(1.0, LIKE_BEFORE * share) * suspects[n] > ALLOWED:
                 findings.append(_stretched(system, body, State(q[n], u[n], float(t[n]))))
         worst = max(findings, key=lambda finding: finding.size, default=None)

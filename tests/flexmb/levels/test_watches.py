@@ -18,7 +18,7 @@ from msgspec.structs import replace
 import flexmb as fm
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import Family
-from flexmb.system import watches
+from flexmb.system import held_stretch, watches
 from flexmb.system.enough_polynomials import ALLOWED
 from flexmb.system.watches import WAIVERS, WATCHES
 from tests.flexmb.levels.strain_beams import PLANE, beam
@@ -245,3 +245,21 @@ def test_a_spinning_rod_is_pulled(rate: float) -> None:
     words = [str(each.message) for each in found if "held against stretch" in str(each.message)]
     stretch = MASS * rate**2 * LENGTH**2 / (12.0 * EA)
     assert words == [] if stretch < 1e-3 else f"lengthen it by {stretch:.2g} of" in words[0]
+
+
+def test_a_state_of_undetermined_loads_hides_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A bound without end says nothing of the next state; a bound that was far too large lets it be left out."""
+    system, looked_at = fm.compile(rod(EA=1e6)), list[float]()
+
+    def stretched(_: fm.System, body: fm.BeamBody, state: fm.State) -> held_stretch.Unstretched:
+        looked_at.append(state.t)
+        return held_stretch.Unstretched(body.name, state.t, 1e-5)
+
+    monkeypatch.setattr(held_stretch, "_stretched", stretched)
+    q, u = np.zeros((3, system.nq)), np.zeros((3, system.nu))
+    for largest, count in (([np.inf, 1e5, 1e5], 3), ([1e5, 1e5, 1e5], 1)):
+        looked_at.clear()
+        load = np.zeros((3, 6))
+        load[:, 3] = [np.nan if np.isinf(each) else each for each in largest]
+        assert list(held_stretch.unstretched(system, np.arange(3.0), q, u, {"mount": load})) == []
+        assert len(looked_at) == count
