@@ -27,8 +27,6 @@ ALLOWED = 1e-3
 """Mean strain along the axis up to which nothing is said: what a steel at 200 MPa stretches."""
 LOOKED_AT = 3
 """States of a run that are looked at: those with the largest forces and turns."""
-LIKE_BEFORE = 4.0
-"""Times the share of its bound that a state has shown, which the next one of the run is taken to stay below."""
 _SECTIONS = 6
 """Gauss points of the mean."""
 _BALANCE = "balance of a beam that is held against stretch"
@@ -80,12 +78,7 @@ def unstretched(system: System, t: Real, q: Real, u: Real, loads: Mapping[str, R
         least = min(float(stiffness_on_axis(station)[EXTENSION, EXTENSION]) for station in body.stations)
         suspects = (force + weight * turn**2) / least
         order = np.argsort(-suspects, kind="stable")[:LOOKED_AT]
-        findings: list[Unstretched] = []
-        for n in order:
-            shown = zip(findings, suspects[order], strict=False)
-            share = max((each.size / bound if np.isfinite(bound) else 1.0 for each, bound in shown), default=1.0)
-            if min(1.0, LIKE_BEFORE * share) * suspects[n] > ALLOWED:
-                findings.append(_stretched(system, body, State(q[n], u[n], float(t[n]))))
+        findings = [_stretched(system, body, State(q[n], u[n], float(t[n]))) for n in order if suspects[n] > ALLOWED]
         worst = max(findings, key=lambda finding: finding.size, default=None)
         if worst is not None and worst.size > ALLOWED:
             yield worst

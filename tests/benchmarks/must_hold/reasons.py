@@ -97,7 +97,7 @@ REASONS = (
     Reason(
         ("exact_coarse",),
         "40 steps take 4 ms; the rest is the watch of the stretch that is held, which forms the loads in sections of "
-        "four beams in eight states in Python (60 ms before it kept its tables, 13 now).",
+        "four beams in three states each in Python, from tables that are kept.",
     ),
     Reason(
         ("readme_warm",),
