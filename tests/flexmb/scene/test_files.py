@@ -178,6 +178,7 @@ def test_errors_of_a_scene_name_the_file_it_was_read_from(tmp_path):
 
 def test_files_of_scenes_that_are_gone_are_forgotten(tmp_path):
     save_scene(satellite().scene(), tmp_path / "scene.toml")
+    gc.collect()  # other tests' scenes are in cycles, and would be collected below
     before = len(loaded._files)
     scene = load_scene(tmp_path / "scene.toml")
     assert len(loaded._files) == before + 1 and loaded.called(scene) == str(tmp_path / "scene.toml")
