@@ -104,7 +104,7 @@ def _watched(runs: BatchTrajectory, turned: Mapping[int, Sequence[TooFast]], ben
     turned, bent: see `BatchRun`.
     """
     batch, found = runs.batch, dict[tuple[str, str], dict[int, Said]]()
-    strained = len(batch.systems[0].constants.section) > 0
+    strained = len(batch.systems[0].constants.section) > 0 or _leaves_out(batch.systems[0])
     failed = set(runs.failed.tolist())
     for copy in range(len(runs.status)) if strained else sorted(turned.keys() | failed):
         if strained or copy in failed:
@@ -116,6 +116,15 @@ def _watched(runs: BatchTrajectory, turned: Mapping[int, Sequence[TooFast]], ben
     for alike in found.values():
         worst = max(alike, key=lambda copy: alike[copy].finding.size)
         yield f'scene "{batch.systems[0].scene.name}": {alike[worst]}{_called(sorted(alike), worst)}'
+
+
+def _leaves_out(system: System) -> bool:
+    """Whether the watch of few modes has to look."""
+    if system.is_rigid:
+        return False
+    from flexmb.system.few_modes import suspects  # imported here because many scenes have no flexible bodies
+
+    return bool(suspects(system))
 
 
 def _seen(runs: BatchTrajectory, copy: int, turned: Sequence[TooFast], bent: Real) -> WatchedStates:

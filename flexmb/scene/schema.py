@@ -154,8 +154,8 @@ class ModalState(SceneStruct, frozen=True, kw_only=True):
 
 Waiver = Literal[
     "wave_speed", "thick_section", "shear_stiffness", "many_elements", "modal_frequency", "negative_stiffness",
-    "negative_damping", "friction_peak", "uncut_beam", "level_range", "few_points", "few_polynomials",
-    "held_stretch",
+    "negative_damping", "friction_peak", "uncut_beam", "level_range", "few_modes", "few_points",
+    "few_polynomials", "held_stretch",
 ]  # fmt: skip
 
 
@@ -171,7 +171,9 @@ class Scene(SceneStruct, frozen=True, kw_only=True, weakref=True):
     For beams of level "exact": "uncut_beam", something inside a piece that makes strains jump; "few_points" and
     "few_polynomials", at rest or in a motion that bends the beam more than they can follow; "held_stretch", loads that
     would change the length of a beam whose stretch is held by a thousandth.
-    For bodies with modes: "level_range", a turn that is fast beside the first frequency, at a level without stiffening.
+    For bodies with modes: "level_range", a turn that is fast beside the first frequency, at a level without stiffening;
+    "few_modes", a family of a beam's modes that `count` leaves out, though the beam lists it or a load on one of its
+    nodes would move it in that family by a thousandth of its length or 0.003 rad.
     A scene without dimensions, or in other consistent units than SI (mm, tonne, s, N), lists "wave_speed",
     "thick_section", "shear_stiffness" and "modal_frequency".
     """

@@ -120,6 +120,12 @@ def _held_stretch(seen: WatchedStates) -> Iterator[AccuracyFinding]:
     return unstretched(seen.system, seen.t, seen.q, seen.u, seen.loads) if seen.loads is not None else iter(())
 
 
+def _few_modes(seen: WatchedStates) -> Iterator[AccuracyFinding]:
+    from flexmb.system.few_modes import left_out  # imported here because many scenes have no flexible bodies
+
+    return left_out(seen.system, seen.t, seen.q, seen.u)
+
+
 class _Watch(NamedTuple):
     waiver: Waiver
     look: Callable[[WatchedStates], Iterator[AccuracyFinding]]
@@ -128,6 +134,7 @@ class _Watch(NamedTuple):
 
 WATCHES = (
     _Watch("level_range", _level_range),
+    _Watch("few_modes", _few_modes),
     _Watch("few_points", _few_points, strains=True),
     _Watch("few_polynomials", _few_polynomials, strains=True),
     _Watch("held_stretch", _held_stretch, strains=True),

@@ -260,3 +260,44 @@ def test_a_state_with_a_large_bound_hides_no_other(monkeypatch: pytest.MonkeyPat
     load[:, 3] = first, 9e4, 8e4
     (found,) = held_stretch.unstretched(system, np.arange(3.0), q, u, {"mount": load})
     assert found.t == 2.0 and found.strain == 2e-3
+
+
+FLEX = s.BeamStation(x_m=0.0, EA_N=1e5, EIy_Nm2=40.0, EIz_Nm2=25.0, GJ_Nm2=25.0, mass_per_length_kg_m=1.0)
+
+
+def few(modes=3, torque=1.0, direction=(1.0, 0.0, 0.0), level="full", turned=False, kind="torque"):
+    """A beam of length 1 under a load on its tip; turned: its axis is World's y."""
+    builder = fm.SceneBuilder("few").beam("rod", length=1.0, elements=8, section=FLEX, modes=modes, level=level)
+    quarter = np.sqrt([0.5, 0.0, 0.0, 0.5])
+    builder.weld("hub", "ground", "rod", parent_quaternion=quarter if turned else (1.0, 0.0, 0.0, 0.0))
+    getattr(builder, kind)("push", "rod", node="tip", direction=direction, function=fm.Constant(value=torque))
+    return builder.marker("tip", "rod", node="tip").scene()
+
+
+@pytest.mark.parametrize("door", QUICK + ("check_scene",))
+@pytest.mark.parametrize("level", ["ruthless", "linear", "full", "stiffened"])
+def test_a_load_that_no_mode_answers_is_told_of(door, level):
+    """With the closed form of what it would do, T L / GJ."""
+    ask = {"check_scene": lambda scene: warned_by(fm.check_scene(scene))}.get(door, ANSWERS[door])
+    (word,) = told(ask, few(level=level))
+    assert 'none of torsion, and at t = 0 s its load "push" would move its node there by 0.04 rad' in word
+    assert told(ask, replace(few(level=level), allow=("few_modes",))) == []
+    assert told(ask, few(s.Modes(count=3, static=True), level=level)) == []
+
+
+@pytest.mark.parametrize(
+    "given, words",
+    [
+        ({"torque": 0.07}, None),  # turns it by less than 3e-3
+        ({"direction": (0.0, 0.0, 1.0)}, None),  # bends it, in modes that it has
+        ({"turned": True}, None),
+        ({"turned": True, "direction": (0.0, 1.0, 0.0)}, "0.04 rad"),
+        ({"kind": "force", "torque": 200.0}, "none of axial, .* by 0.002 of its length"),
+        ({"kind": "force", "torque": 90.0}, None),
+        ({"modes": s.Modes(count=1, families=("bending_y", "torsion")), "torque": 0.0}, "none of torsion, which its"),
+        ({"modes": s.Modes(count=1), "direction": (0.0, 1.0, 0.0)}, "none of bending_z, .* by 0.025 rad"),
+    ],
+)
+def test_what_modes_leave_out_depends_on_the_load(given, words):
+    answers = told(fm.equilibrium, few(**given))
+    assert (answers == []) if words is None else re.search(words, answers[0]), answers

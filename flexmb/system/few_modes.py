@@ -1,0 +1,155 @@
+"""Whether the modes of a beam leave out a family: no mode stretches it, twists it, or bends it in a plane.
+
+`count` takes the modes of lowest frequency, so that a slender beam of three modes neither twists nor stretches. Whoever
+lists such a family by name, or puts a load on a node which only that family could answer, would otherwise find a zero
+without a word. What it would have been is the static answer of the beam's finite elements.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple, assert_never
+
+import numpy as np
+
+from flexmb.modal.beam import beam_elements
+from flexmb.modal.eigenproblem import solve_definite
+from flexmb.modal.flexible import flexible_model
+from flexmb.scene.bodies import BeamBody, Family
+from flexmb.scene.functions import Constant, ControlSignal, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
+from flexmb.scene.schema import Load
+from flexmb.scene.strains import families
+from flexmb.system.frames import body_pose
+from flexmb.system.system import System
+from flexmb.typing import Real
+
+STRETCH, TURN = 1e-3, 3e-3
+"""Part of the length by which a load may stretch a beam, and angle (rad) by which it may turn a section, before
+something is said: as for stretch that is held, and as for polynomials that are left out."""
+_MOVES: dict[Family, tuple[int, ...]] = {"axial": (0,), "torsion": (3,), "bending_y": (1, 5), "bending_z": (2, 4)}
+"""Components of (displacement, rotation) of a section by family."""
+
+
+class LeftOut(NamedTuple):
+    """At t (s) a `load` would move a section by `size`, a part of the length or an angle in rad, in families of which
+    the beam has no mode; without a load these are families that it lists."""
+
+    body: str
+    given: int
+    left_out: tuple[Family, ...]
+    load: str | None = None
+    t: float = 0.0
+    size: float = np.inf
+
+    @property
+    def what(self) -> str:
+        none = f'beam "{self.body}" has {self.given} modes, none of {", ".join(self.left_out)}'
+        if self.load is None:
+            return f"{none}, which its `families` list"
+        unit = "of its length" if self.left_out == ("axial",) else "rad"
+        moved = f"would move its node there by {self.size:.2g} {unit}"
+        return f'{none}, and at t = {self.t:g} s its load "{self.load}" {moved}'
+
+    @property
+    def remedy(self) -> str:
+        return "give its modes `static = true`, which adds the answers to loads at the tip, or a larger `count`"
+
+
+def idle(body: BeamBody) -> tuple[Family, ...]:
+    """The families of a beam in which none of its modes moves the tip; none of levels rigid and exact.
+
+    Raises ValueError for a beam without so many modes.
+    """
+    if body.level in ("rigid", "exact"):
+        return ()
+    tip = flexible_model(body).nodes["tip"]
+    motion = np.vstack([tip.translation, body.length_m * tip.rotation_modes])
+    rounding = 1e-9 * np.max(np.abs(motion), initial=0.0)
+    return tuple(family for family in families(body) if np.all(np.abs(motion[list(_MOVES[family])]) <= rounding))
+
+
+def left_out(system: System, t: Real, q: Real, u: Real) -> Iterator[LeftOut]:
+    """Of each beam the worst of what its modes leave out in the states q (T,nq), u (T,nu) at t (T,) s."""
+    for body, without in suspects(system):
+        if listed := tuple(family for family in without if family in (body.modes.families or ())):
+            yield LeftOut(body.name, flexible_model(body).mode_count, listed)
+            continue
+        loads = [load for load in system.scene.loads if load.body == body.name]
+        moved = (_moved(system, body, without, load, (t, q, u)) for load in loads)
+        worst = max(filter(None, moved), key=lambda finding: finding.size, default=None)
+        if worst is not None:
+            yield worst
+
+
+def suspects(system: System) -> list[tuple[BeamBody, tuple[Family, ...]]]:
+    """The beams with families without a mode that list families or carry loads, and these families."""
+    loaded = {load.body for load in system.scene.loads}
+    beams = [body for body in system.scene.bodies if isinstance(body, BeamBody)]
+    watched = [body for body in beams if body.name in loaded or body.modes.families is not None]
+    return [(body, without) for body in watched if (without := _idle(system, body))]
+
+
+def _idle(system: System, body: BeamBody) -> tuple[Family, ...]:
+    key = ("families without a mode", body.name)
+    without = system.kept.get(key)
+    return system.kept.setdefault(key, idle(body)) if without is None else without
+
+
+def _moved(
+    system: System, body: BeamBody, without: tuple[Family, ...], load: Load, states: tuple[Real, Real, Real]
+) -> LeftOut | None:
+    """The family that the load would move most when it is largest; None where that is little."""
+    t, q, u = states
+    size = np.array([_largest(load.function, float(time)) for time in t])
+    n, node = int(np.argmax(size)), flexible_model(body).nodes[load.node]
+    direction = np.asarray(load.direction)
+    if load.frame == "world":
+        system.turns(float(t[n]), q[n], u[n])  # for the poses in the workspace
+        direction = body_pose(system, system.own_workspace, system.body_names.index(body.name)).rotation.T @ direction
+    else:
+        direction = node.rotation @ direction
+    wrench = np.zeros(6)
+    wrench[0 if load.type == "force" else 3 :][:3] = size[n] * direction
+    shares = {}
+    for family in without:
+        motion = np.abs(_answer(body, family, float(node.position[0]), wrench))
+        shares[family] = motion[0] / body.length_m / STRETCH if family == "axial" else np.max(motion[3:]) / TURN
+    worst = max(shares, key=lambda family: float(shares[family]))
+    if not shares[worst] > 1.0:
+        return None
+    return LeftOut(
+        body.name, flexible_model(body).mode_count, (worst,), load.name, float(t[n]),
+        float(shares[worst]) * (STRETCH if worst == "axial" else TURN),
+    )  # fmt: skip
+
+
+def _answer(body: BeamBody, family: Family, x: float, wrench: Real) -> Real:
+    """(6,) Displacement and rotation of the section at x (m) of the beam, clamped at its root, under a force and moment
+    there, in one family."""
+    elements = beam_elements(body)
+    free = np.arange(elements.size)[elements.coordinates(family)]
+    free = free[~np.isin(free, elements.clamped_coordinates())]
+    shapes = elements.motion(np.array([x]), np.eye(elements.size))[0][:, free]
+    answer: Real = shapes @ solve_definite(elements.stiffness()[np.ix_(free, free)], shapes.T @ wrench)
+    return answer
+
+
+def _largest(function: Function, t: float) -> float:
+    """The largest size of a function of time, of one that grows without bound that at t (s)."""
+    match function:
+        case Constant(value=value) | Pulse(value=value):
+            return abs(value)
+        case Ramp(value=value, rate=rate, start_s=start):
+            return abs(value + rate * (t - start))
+        case Sine(amplitude=amplitude, offset=offset):
+            return abs(offset) + abs(amplitude)
+        case SmoothStep(start_value=start, end_value=end):
+            return max(abs(start), abs(end))
+        case SpinUp(rate=rate):
+            return abs(rate * t)
+        case Table(values=values):
+            return max(map(abs, values))
+        case ControlSignal():
+            return 0.0  # the controller decides it
+        case _:
+            assert_never(function)
