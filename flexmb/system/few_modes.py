@@ -1,8 +1,8 @@
 """Whether the modes of a beam leave out a family: no mode stretches it, twists it, or bends it in a plane.
 
 `count` takes the modes of lowest frequency, so that a slender beam of three modes neither twists nor stretches. Whoever
-lists such a family by name, or puts a load on a node which only that family could answer, would otherwise find a zero
-without a word. What it would have been is the static answer of the beam's finite elements.
+puts a load on a node which only such a family could answer would otherwise find a zero without a word. What it would
+have been is the static answer of the beam's finite elements.
 """
 
 from __future__ import annotations
@@ -31,24 +31,23 @@ _MOVES: dict[Family, tuple[int, ...]] = {"axial": (0,), "torsion": (3,), "bendin
 
 
 class LeftOut(NamedTuple):
-    """At t (s) a `load` would move a section by `size`, a part of the length or an angle in rad, in families of which
-    the beam has no mode; without a load these are families that it lists."""
+    """At t (s) a `load` would move a section of a beam by `size`, a part of the length or an angle in rad, in a family
+    of which none of the beam's `given` modes is."""
 
     body: str
     given: int
-    left_out: tuple[Family, ...]
-    load: str | None = None
-    t: float = 0.0
-    size: float = np.inf
+    family: Family
+    load: str
+    t: float
+    size: float
 
     @property
     def what(self) -> str:
-        none = f'beam "{self.body}" has {self.given} modes, none of {", ".join(self.left_out)}'
-        if self.load is None:
-            return f"{none}, which its `families` list"
-        unit = "of its length" if self.left_out == ("axial",) else "rad"
-        moved = f"would move its node there by {self.size:.2g} {unit}"
-        return f'{none}, and at t = {self.t:g} s its load "{self.load}" {moved}'
+        moved = f"would move its node there by {self.size:.2g} {'of its length' if self.family == 'axial' else 'rad'}"
+        return (
+            f'beam "{self.body}" has {self.given} modes, none of {self.family}, and at t = {self.t:g} s its load '
+            f'"{self.load}" {moved}'
+        )
 
     @property
     def remedy(self) -> str:
@@ -71,9 +70,6 @@ def idle(body: BeamBody) -> tuple[Family, ...]:
 def left_out(system: System, t: Real, q: Real, u: Real) -> Iterator[LeftOut]:
     """Of each beam the worst of what its modes leave out in the states q (T,nq), u (T,nu) at t (T,) s."""
     for body, without in suspects(system):
-        if listed := tuple(family for family in without if family in (body.modes.families or ())):
-            yield LeftOut(body.name, flexible_model(body).mode_count, listed)
-            continue
         loads = [load for load in system.scene.loads if load.body == body.name]
         moved = (_moved(system, body, without, load, (t, q, u)) for load in loads)
         worst = max(filter(None, moved), key=lambda finding: finding.size, default=None)
@@ -82,11 +78,10 @@ def left_out(system: System, t: Real, q: Real, u: Real) -> Iterator[LeftOut]:
 
 
 def suspects(system: System) -> list[tuple[BeamBody, tuple[Family, ...]]]:
-    """The beams with families without a mode that list families or carry loads, and these families."""
+    """The beams that carry loads and have families without a mode, and these families."""
     loaded = {load.body for load in system.scene.loads}
-    beams = [body for body in system.scene.bodies if isinstance(body, BeamBody)]
-    watched = [body for body in beams if body.name in loaded or body.modes.families is not None]
-    return [(body, without) for body in watched if (without := _idle(system, body))]
+    beams = [body for body in system.scene.bodies if isinstance(body, BeamBody) and body.name in loaded]
+    return [(body, without) for body in beams if (without := _idle(system, body))]
 
 
 def _idle(system: System, body: BeamBody) -> tuple[Family, ...]:
@@ -118,7 +113,7 @@ def _moved(
     if not shares[worst] > 1.0:
         return None
     return LeftOut(
-        body.name, flexible_model(body).mode_count, (worst,), load.name, float(t[n]),
+        body.name, flexible_model(body).mode_count, worst, load.name, float(t[n]),
         float(shares[worst]) * (STRETCH if worst == "axial" else TURN),
     )  # fmt: skip
 

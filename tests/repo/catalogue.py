@@ -1,10 +1,12 @@
-"""docs/cases.md: every shipped case, who runs it, what anchors it, and how well its numbers are known. Write it with
+"""docs/cases.md: every shipped case, who runs it, what anchors it, and how well its numbers are known;
+docs/library: a page of what its cases show for each folder of them. Write them with
 
 python -m tests.repo.catalogue
 """
 
 import re
 from collections.abc import Iterator
+from pathlib import Path
 
 from crosscheck.export.metadata import cite
 from crosscheck.library.basis import basis
@@ -14,6 +16,7 @@ from tests.repo.holders import words
 from tests.repo.project import ROOT
 
 PAGE = ROOT / "docs" / "cases.md"
+FOLDER = ROOT / "docs" / "library"
 FAMILIES = {
     "closed_form": "Closed form: a formula gives the motion or a part of it.",
     "published": "Published: numbers of a paper or a benchmark.",
@@ -24,6 +27,13 @@ INTRODUCTION = """# Cases
 
 Every case with what anchors it. This page is generated from the folders in `cases`: `python -m tests.repo.catalogue`.
 `crosscheck run NAME` runs a case, `crosscheck verify NAME my.csv` holds your own code's results against it.
+
+```{toctree}
+:hidden:
+:glob:
+
+library/*
+```
 
 *Rests on* is read from the stored routes: the closed form and the codes that agree, or native alone with its
 formulations.
@@ -46,13 +56,32 @@ def page() -> str:
         head = ["| case | what | engines | rests on | known to |", "|---|---|---|---|---|"]
         name, _, text = meaning.partition(": ")
         parts += [f"## {name}\n\n{text[0].upper()}{text[1:]}\n", "\n".join([*head, *rows]) + "\n"]
-    parts += ["## What each case shows\n", *(section for case in cases for section in _section(case))]
     return "\n".join(parts)
+
+
+def pages() -> dict[Path, str]:
+    """The pages of the folders of cases, by their paths."""
+    folders = dict[str, list[Case]]()
+    for case in shipped_cases():
+        folders.setdefault(_folder(case), []).append(case)
+    return {
+        FOLDER / f"{folder}.md": "\n".join([_head(folder), *(part for case in cases for part in _section(case))])
+        for folder, cases in folders.items()
+    }
+
+
+def _folder(case: Case) -> str:
+    return case.name.partition("/")[0]
+
+
+def _head(folder: str) -> str:
+    title = folder.replace("_", " ").capitalize()
+    return f"# {title}\n\nThe cases of `cases/{folder}`, see [all cases](../cases.md).\n"
 
 
 def _row(case: Case) -> str:
     engines = dict.fromkeys(engine for variant in case.run.variants for engine in variant.engines)
-    link = f"[{case.name}](#{_anchor(case.name)})"
+    link = f"[{case.name}](library/{_folder(case)}.md#{_anchor(case.name)})"
     return f"| {link} | {case.run.title} | {', '.join(engines)} | {_basis(case)} | {_known(case)} |"
 
 
@@ -76,13 +105,14 @@ def _anchor(name: str) -> str:
 
 
 def _section(case: Case) -> Iterator[str]:
-    """The case's own page, its headings two levels down, its picture from the case's folder."""
+    """The case's own page, its headings one level down, its picture from the case's folder."""
     assert case.provenance is not None
     text = re.sub(r"\A# .*\n", "", case.readme)
-    text = re.sub(r"^(#+) ", r"##\1 ", text, flags=re.M)
-    text = re.sub(r"\]\((?!https?:|#)([^)]+)\)", rf"](../cases/{case.name}/\1)", text)
-    yield f"### {case.name}\n"
-    yield f"**{case.run.title}.** Tags: {', '.join(case.run.tags) or 'none'}. Known: {case.provenance.uncertainty}.\n"
+    text = re.sub(r"^(#+) ", r"#\1 ", text, flags=re.M)
+    text = re.sub(r"\]\((?!https?:|#)([^)]+)\)", rf"](../../cases/{case.name}/\1)", text)
+    yield f"## {case.name}\n"
+    known = case.provenance.uncertainty.rstrip(".")
+    yield f"**{case.run.title}.** Tags: {', '.join(case.run.tags) or 'none'}. Known: {known}.\n"
     yield f"{text.strip()}\n"
     yield f"Rests on: {_basis(case)}. Sources: {'; '.join(case.provenance.sources)}\n"
     if held := "\n".join(words(case)):
@@ -91,8 +121,11 @@ def _section(case: Case) -> Iterator[str]:
 
 
 def main() -> None:
-    """Write the page."""
+    """Write the pages."""
     PAGE.write_text(page(), encoding="utf-8")
+    FOLDER.mkdir(exist_ok=True)
+    for path, text in pages().items():
+        path.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

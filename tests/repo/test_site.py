@@ -20,6 +20,11 @@ def test_a_page_is_what_its_generator_writes(maker: ModuleType) -> None:
     assert maker.PAGE.read_text(encoding="utf-8") == maker.page(), f"run `python -m {maker.__name__}`"
 
 
+def test_pages_of_cases_are_what_their_generator_writes() -> None:
+    written = {path: path.read_text(encoding="utf-8") for path in catalogue.FOLDER.glob("*.md")}
+    assert written == catalogue.pages(), f"run `python -m {catalogue.__name__}`; delete what is left over"
+
+
 def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
     pytest.importorskip("sphinx")
     build = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-E", "-d", tmp_path / "trees"]
