@@ -59,8 +59,7 @@ def hold_against(baseline: Baseline, outcome: SessionOutcome, out: Path) -> Agai
     from crosscheck.report.ci import add_differences
     from crosscheck.sealed.compare import compare_results
     from crosscheck.sealed.seal import FILE, read_results
-    from flexmb.output.whole import write_whole
-    from flexmb.output.writing import folder
+    from flexmb.output.files import folder, write_whole
 
     if baseline.results is not None:
         differences = compare_results(baseline.results, read_results(out / FILE))

@@ -12,8 +12,7 @@ import typer
 from crosscheck.cli import common
 from crosscheck.running.scheduler import Limits
 from crosscheck.terminal.text import words
-from flexmb.output.whole import take_away, write_whole
-from flexmb.output.writing import check_folder, folder
+from flexmb.output.files import check_folder, folder, take_away, write_whole
 
 Variants = Annotated[
     list[str] | None,

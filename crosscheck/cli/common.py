@@ -16,8 +16,8 @@ from crosscheck.library.case_error import CaseError
 from crosscheck.library.own_files import OURS, source_folder
 from crosscheck.running.scheduler import TIME_LIMIT_S
 from crosscheck.terminal.text import Verbosity, words
+from flexmb.output.files import in_words
 from flexmb.output.terminal import Terminal
-from flexmb.output.writing import in_words
 from flexmb.scene.problems import SceneWarning, closest
 from flexmb.scene.user_code import forbid_user_code
 

@@ -11,7 +11,7 @@ from crosscheck.cli import common
 from crosscheck.running.scheduler import Limits
 from crosscheck.running.schedulers import LOCAL, scheduler_at
 from crosscheck.terminal.text import words
-from flexmb.output.whole import write_whole
+from flexmb.output.files import write_whole
 
 
 @common.app.command("sweep")

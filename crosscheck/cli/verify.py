@@ -22,7 +22,7 @@ from crosscheck.cli.common import (
 )
 from crosscheck.running.schedulers import LOCAL, scheduler_at
 from crosscheck.terminal.text import words
-from flexmb.output.whole import write_whole
+from flexmb.output.files import write_whole
 
 if TYPE_CHECKING:
     from crosscheck.library.find import Case

@@ -28,9 +28,7 @@ from crosscheck.library.find import Case, shipped_folder
 from crosscheck.library.read_file import text_of
 from crosscheck.library.reference import VALUES, StoredReference, current_reference, values_text
 from crosscheck.running.plan import variant_scene
-from flexmb.output.csv_cells import as_text
-from flexmb.output.whole import write_whole
-from flexmb.output.writing import check_folder, folder
+from flexmb.output.files import as_text, check_folder, folder, write_whole
 from flexmb.run.channels import unit
 from flexmb.scene.problems import SceneError
 

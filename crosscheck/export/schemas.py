@@ -19,7 +19,7 @@ from crosscheck.library.accepted import Accepted
 from crosscheck.library.case import Provenance, RunFile
 from crosscheck.library.reference import Knowledge
 from crosscheck.sealed.document import SealedResults
-from flexmb.output.whole import write_whole
+from flexmb.output.files import write_whole
 from flexmb.scene.reference import json_schema
 
 FOLDER = Path("docs") / "schemas"

@@ -16,7 +16,7 @@ from crosscheck.library.find import Case
 from crosscheck.records.archive import Archive, read
 from crosscheck.records.kinds import CaseRecord
 from crosscheck.records.session import last_session
-from flexmb.output.whole import write_whole
+from flexmb.output.files import write_whole
 
 
 class NotAccepted(ValueError):

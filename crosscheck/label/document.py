@@ -23,7 +23,7 @@ from crosscheck.label.factors import CRITERIA, FACTORS, HIGHEST, TITLES, Factor
 from crosscheck.label.ladder import looked
 from crosscheck.sealed.document import SealedResults
 from crosscheck.sealed.seal import SEAL, seal_of
-from flexmb.output.whole import write_whole
+from flexmb.output.files import write_whole
 
 FILE = "label.json"
 FORMAT, VERSION, STANDARD = "crosscheck label", 1, "NASA-STD-7009B"

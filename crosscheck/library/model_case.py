@@ -8,7 +8,7 @@ from msgspec.structs import replace
 
 from crosscheck.library.case_error import CaseError
 from crosscheck.library.starting import RATE, is_welded, moves, started
-from flexmb.output.whole import write_whole
+from flexmb.output.files import write_whole
 from flexmb.scene.bodies import Body, RigidBody
 from flexmb.scene.files import inline, load_scene, save_scene
 from flexmb.scene.hinges import Weld

@@ -16,8 +16,8 @@ from crosscheck.library.case_error import CaseError
 from flexmb.dense import DenseSystem
 from flexmb.dense.body_frames import Motions
 from flexmb.dense.closures import DEPENDENT, rows
-from flexmb.dense.function_jets import profile
 from flexmb.dense.hinge_frames import coordinate_rates, rotation_of
+from flexmb.dense.jets import profile
 from flexmb.dense.members import Member
 from flexmb.scene import schema as s
 from flexmb.scene.freedoms import Ball, Floating, ScalarFreedom

@@ -31,7 +31,7 @@ from crosscheck.running.job import MAIN, Job
 from crosscheck.running.plan import plan, scene_identity
 from crosscheck.running.scheduler import BY_DEFAULT, Limits
 from crosscheck.running.sweep import Listener, run_planned
-from flexmb.output.whole import take_away, write_whole
+from flexmb.output.files import take_away, write_whole
 from flexmb.run.channels import magnitude
 from flexmb.scene.check import check_scene
 

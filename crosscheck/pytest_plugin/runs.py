@@ -21,7 +21,7 @@ from crosscheck.records.session import last_session
 from crosscheck.running.plan import plan
 from crosscheck.running.scheduler import Limits
 from crosscheck.running.sweep import run_planned
-from flexmb.output.whole import write_whole
+from flexmb.output.files import write_whole
 
 DONE, LOCK = "session", ".crosscheck.lock"
 

@@ -23,8 +23,7 @@ from crosscheck.library.channels import part_of
 from crosscheck.library.check import check_recorded
 from crosscheck.records.kinds import BrokenLine, CaseRecord, ChartRecord, Record, RecordedReference, RunRecord, Written
 from crosscheck.records.packing import Packed, packed_bytes, unpack
-from flexmb.output.whole import whole_file
-from flexmb.output.writing import folder, writing
+from flexmb.output.files import folder, whole_file, writing
 from flexmb.scene.reading import MIB, allowance, regular_size
 
 T = TypeVar("T")

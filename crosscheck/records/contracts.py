@@ -17,7 +17,7 @@ from crosscheck.engines.registry import BUILT_IN, home
 from crosscheck.library.own_files import source_folder
 from crosscheck.records.kinds import ContractState
 from crosscheck.records.made_by import made_by
-from flexmb.output.whole import write_whole
+from flexmb.output.files import write_whole
 
 FILE = "contract.json"
 CLAUSES = "conformance"  # the package whose files are the clauses

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from flexmb.output.writing import folder as made
-from flexmb.output.writing import writing
+from flexmb.output.files import folder as made
+from flexmb.output.files import writing
 
 LOCK, HOLDER = ".crosscheck.lock", ".crosscheck.holder"
 

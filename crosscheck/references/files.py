@@ -15,7 +15,7 @@ from tomlkit.items import Table
 
 from crosscheck.library.reference import KNOWLEDGE, VALUES, Knowledge, StoredReference
 from crosscheck.references.agreement import Agreed
-from flexmb.output.whole import whole_file, write_whole
+from flexmb.output.files import whole_file, write_whole
 from flexmb.run.channels import distance, unit
 
 HEADER = "Written by `crosscheck regenerate`, with reference.csv; nobody edits it. docs/references.md explains it."

@@ -27,8 +27,7 @@ from crosscheck.report.site import Material, write_single, write_site, write_unf
 from crosscheck.sealed.badge import write_badges
 from crosscheck.sealed.document import results_of
 from crosscheck.sealed.seal import write_results
-from flexmb.output.whole import clear_parts, take_away
-from flexmb.output.writing import folder
+from flexmb.output.files import clear_parts, folder, take_away
 
 __all__ = ["Choice", "SessionOutcome", "mark_unfinished", "write_all"]
 

@@ -16,8 +16,8 @@ from crosscheck.label.document import FILE as LABEL
 from crosscheck.label.document import LabelFile, heads, level_rows
 from crosscheck.label.factors import FACTORS
 from crosscheck.sealed.compare import Differences
+from flexmb.output.files import write_whole
 from flexmb.output.printable import printable
-from flexmb.output.whole import write_whole
 
 VERDICTS = "verdicts.json"
 WORK = ("work_a", "work_b")  # keys of a verdict's record: what the runs of its sides took

@@ -19,8 +19,8 @@ from crosscheck.judging.results import CaseResults, Key, Result, Session
 from crosscheck.judging.unjudged import grouped
 from crosscheck.judging.verdict import Verdict
 from crosscheck.report.ci import role_words
+from flexmb.output.files import whole_file
 from flexmb.output.printable import printable
-from flexmb.output.whole import whole_file
 
 NO_SESSION = Session((), ())
 

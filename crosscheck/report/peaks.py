@@ -9,7 +9,7 @@ from typing import NamedTuple
 from crosscheck.engines.extremes import components
 from crosscheck.judging.peaks import PeakOfChannel, has_envelopes, peaks
 from crosscheck.judging.results import CaseResults, Session
-from flexmb.output.whole import take_away, write_csv
+from flexmb.output.files import take_away, write_csv
 from flexmb.run.channels import family, unit
 
 FILE = "envelope.csv"

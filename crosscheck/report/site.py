@@ -27,8 +27,7 @@ from crosscheck.report.mutations import Scores
 from crosscheck.report.overview import findings, matrix
 from crosscheck.report.places import INDEX, CasePlace, places
 from crosscheck.report.speed import LEVELS, speed_view
-from flexmb.output.whole import write_whole
-from flexmb.output.writing import folder
+from flexmb.output.files import folder, write_whole
 
 FOLDER = "report"
 SINGLE = "report.html"

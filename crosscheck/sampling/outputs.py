@@ -19,9 +19,7 @@ import numpy as np
 
 from crosscheck.sampling.file import SweepFile
 from crosscheck.sampling.sample import Sampled, SampleRecord
-from flexmb.output.csv_cells import as_text
-from flexmb.output.whole import whole_file
-from flexmb.output.writing import writing
+from flexmb.output.files import as_text, whole_file, writing
 from flexmb.typing import Real
 
 QUANTILES = (0.05, 0.5, 0.95)

@@ -35,7 +35,7 @@ from crosscheck.library.case import CaseError, Variant
 from crosscheck.library.find import Case
 from crosscheck.library.patterns import most_specific
 from crosscheck.running.plan import prescribed, sample_times, variant_scene
-from flexmb.output.whole import write_whole
+from flexmb.output.files import write_whole
 from flexmb.run.channels import distance, family, signal_range
 from flexmb.scene.check import check_scene
 from flexmb.scene.files import load_scene

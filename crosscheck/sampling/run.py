@@ -30,8 +30,7 @@ from crosscheck.sampling.outputs import samples_table
 from crosscheck.sampling.refusals import require_sense
 from crosscheck.sampling.sample import Sampled, SampleJob, SampleRecord, Written, run_sample
 from crosscheck.sampling.values import sample_values
-from flexmb.output.whole import take_away
-from flexmb.output.writing import in_words
+from flexmb.output.files import in_words, take_away
 from flexmb.scene.files import load_scene
 from flexmb.scene.problems import SceneError, closest
 from flexmb.scene.schema import Scene

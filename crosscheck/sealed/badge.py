@@ -7,7 +7,7 @@ from pathlib import Path
 from xml.sax.saxutils import escape
 
 from crosscheck.judging.outcome import SessionOutcome
-from flexmb.output.whole import write_whole
+from flexmb.output.files import write_whole
 
 LABEL = "crosscheck"
 COLOURS = {"brightgreen": "#2f7d32", "red": "#b3261e", "lightgrey": "#5f6368"}  # white on them has a contrast above 5

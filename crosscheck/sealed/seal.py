@@ -18,7 +18,7 @@ from typing import Any, NoReturn
 import msgspec
 
 from crosscheck.sealed.document import FORMAT, VERSION, SealedResults
-from flexmb.output.whole import write_whole
+from flexmb.output.files import write_whole
 from flexmb.scene.reading import MIB, Unreadable, read_bytes
 
 FILE = "results.json"

@@ -15,7 +15,7 @@ import msgspec
 from crosscheck.library.digests import case_digests
 from crosscheck.library.own_files import code_here
 from crosscheck.sealed.seal import SEAL, seal_of
-from flexmb.output.whole import write_whole
+from flexmb.output.files import write_whole
 
 FILES, CODE = "files", "code"
 

@@ -16,7 +16,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from crosscheck.stability.boundary import label
 from crosscheck.stability.map import Axis, StabilityMap
 from crosscheck.stability.run import Finished
-from flexmb.output.whole import save_figure
+from flexmb.output.files import save_figure
 
 STATUSES = {"failed": "#756bb1", "did not finish": "#fdd835", "did not run": "#969696"}
 LINE_POINTS = 400

@@ -10,7 +10,7 @@ import msgspec
 
 from crosscheck.records.archive import BrokenRecords
 from crosscheck.stability.boundary import MapVerdict
-from flexmb.output.whole import take_away, write_whole
+from flexmb.output.files import take_away, write_whole
 from flexmb.scene.reading import regular_size
 
 VERDICTS = "maps.json"

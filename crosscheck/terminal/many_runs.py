@@ -20,9 +20,8 @@ from crosscheck.stability.run import Finished, run_map
 from crosscheck.stability.verdict_file import VERDICTS, take_away_verdicts, write_verdicts
 from crosscheck.terminal.progress import bars
 from crosscheck.terminal.text import marked, words
+from flexmb.output.files import folder, take_away
 from flexmb.output.listing import Listing, figures, names
-from flexmb.output.whole import take_away
-from flexmb.output.writing import folder
 
 
 def run_and_draw(

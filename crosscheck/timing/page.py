@@ -14,9 +14,8 @@ from jinja2 import Environment, PackageLoader
 from crosscheck.records.machine import environment
 from crosscheck.timing.chart import CaseCharts
 from crosscheck.timing.picture import draw_chart
+from flexmb.output.files import folder, write_whole
 from flexmb.output.printable import printable
-from flexmb.output.whole import write_whole
-from flexmb.output.writing import folder
 
 INDEX, DATA = "index.html", "charts.json"
 

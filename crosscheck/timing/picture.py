@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from crosscheck.timing.chart import CaseCharts, ChartData, ChartPoint
-from flexmb.output.whole import save_figure
+from flexmb.output.files import save_figure
 
 # distinguishable with colour blindness
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#7a5c00", "#3f3f8f", "#8c2d04", "#00695c")

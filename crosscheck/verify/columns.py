@@ -16,7 +16,7 @@ from crosscheck.judging.against_reference import CLOCK, shared_times
 from crosscheck.library.case import CaseError
 from crosscheck.library.channels import KINDS, LINEAR_KINDS, kind_named, part_of
 from crosscheck.library.reference import channels_by_column
-from flexmb.output.csv_cells import NUMBER, from_text
+from flexmb.output.files import NUMBER, from_text
 from flexmb.scene.reading import MIB, Unreadable, read_text
 from flexmb.typing import Real
 

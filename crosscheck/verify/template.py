@@ -11,7 +11,7 @@ from crosscheck.library.reference import current_reference
 from crosscheck.running.plan import sample_times, variant_scene
 from crosscheck.verify.columns import short_names
 from crosscheck.verify.target import chosen_variant, goal_of, has_stored
-from flexmb.output.csv_cells import as_text
+from flexmb.output.files import as_text
 from flexmb.scene.schema import Scene
 
 

@@ -21,7 +21,7 @@ from flexmb.advisor.quantity import Quantity, measured, quantities, scales
 from flexmb.advisor.remedies import remedies
 from flexmb.advisor.search import search
 from flexmb.integrate.settings import Settings
-from flexmb.run.samples import refuse_large_run
+from flexmb.run.times import refuse_large_run
 from flexmb.scene.bodies import BeamBody, Level, ModalBody
 from flexmb.scene.check import check_and_warn
 from flexmb.scene.open_loop import refuse_feedback
@@ -29,7 +29,7 @@ from flexmb.scene.problems import SceneWarning
 from flexmb.scene.schema import Scene
 from flexmb.system.held_stretch import unstretchable
 from flexmb.tables import arguments
-from flexmb.tables.brief import brief
+from flexmb.tables.named import brief
 
 BUDGET = 4e10
 """The search for cheaper models ends when its runs have taken this many operations (about 20 s)."""

@@ -24,8 +24,7 @@ from numpy.typing import NDArray
 
 from flexmb.advisor.contribution import contribution, free_share, moved
 from flexmb.advisor.modal_response import FAMILIES, ModalResponse, RigidRun, eigenmodes
-from flexmb.advisor.models import BodyModel
-from flexmb.advisor.sprung import fitted_hinge
+from flexmb.advisor.models import BodyModel, fitted_hinge
 from flexmb.frisch.equivalence.appendage import appendage_of
 from flexmb.frisch.equivalence.comparison import coupling_error
 from flexmb.modal.flexible_model import FlexibleModel

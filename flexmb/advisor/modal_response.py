@@ -24,7 +24,7 @@ from scipy.spatial.transform import Rotation
 
 from flexmb.advisor.methods import RunMethod, simulated
 from flexmb.closure.closures import ClosureError
-from flexmb.dense.function_jets import profile
+from flexmb.dense.jets import profile
 from flexmb.frisch.normalisation import combined
 from flexmb.modal import flexible_model
 from flexmb.modal.flexible_model import FlexibleModel

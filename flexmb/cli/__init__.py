@@ -37,7 +37,7 @@ Run it, write CSV and charts: `flexmb simulate scene.toml --t-end 10 --out resul
 
 def _show_version(asked: bool) -> None:
     if asked:
-        from flexmb.cli.versions import versions_text  # it reads the metadata of installed distributions
+        from flexmb.cli.terminal import versions_text  # it reads the metadata of installed distributions
 
         typer.echo(versions_text())
         raise typer.Exit

@@ -9,7 +9,7 @@ import typer
 from rich.text import Text
 
 from flexmb.cli.terminal import EXIT_STOPPED, NoUserCode, SceneFile, console, no_traceback
-from flexmb.output.writing import check_folder, folder
+from flexmb.output.files import check_folder, folder
 
 
 def advise(

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from flexmb.cli.terminal import NoUserCode, SceneFile, console, no_traceback, vector
-from flexmb.output.writing import check_folder
+from flexmb.output.files import check_folder
 
 
 def equivalence(

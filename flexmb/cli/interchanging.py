@@ -9,11 +9,45 @@ import typer
 from rich.text import Text
 
 from flexmb.cli.terminal import NoUserCode, SceneFile, console, errors, no_traceback
+from flexmb.output.files import check_folder, folder
 from flexmb.output.printable import printable
-from flexmb.output.writing import check_folder, folder
 
 if TYPE_CHECKING:
+    from flexmb.interchange.superelement import Tie
     from flexmb.scene.schema import Scene
+
+
+MANY = 8_000  # nodes in a range: more than a structure can have
+
+
+def numbers_of(option: str, words: str) -> list[int]:
+    """Numbers of nodes; ValueError, which names the option."""
+    numbers = list[int]()
+    for word in words.split(","):
+        first, to, last = word.partition("-")
+        try:
+            start, stop = int(first), int(last if to else first)
+        except ValueError:
+            raise ValueError(f"{option} is numbers of nodes such as 1,12 or 1-20; got {words!r}") from None
+        if not 0 <= stop - start < MANY:
+            raise ValueError(f"{option}: {word} is not a range of at most {MANY} nodes, from the lower to the higher")
+        numbers += range(start, stop + 1)
+    return numbers
+
+
+def tie_of(kind: Literal["rigid", "mean"], words: str) -> Tie:
+    """A surface and the node that it is tied to; ValueError, which names the option."""
+    from flexmb.interchange.superelement import Tie
+
+    head, _, surface = words.partition("=")
+    node, at, place = head.partition("@")
+    try:
+        x, y, z = map(float, place.split(",")) if at else (0.0, 0.0, 0.0)
+        number = int(node)
+    except ValueError:
+        raise ValueError(f"--{kind} is a new node and its surface, 900=1-20 or 900@X,Y,Z=1-20; got {words!r}") from None
+    return Tie(number, tuple(numbers_of(f"--{kind}", surface)), kind, (x, y, z) if at else None)
+
 
 SHOWN = 10  # modes of a reduced body that are shown beside those of the structure
 Out = Annotated[Path, typer.Option("--out", "-o", help="File to write.", show_default=False)]
@@ -194,7 +228,6 @@ def reduce(
     with no_traceback():
         import numpy as np
 
-        from flexmb.cli.numbers_of_nodes import numbers_of, tie_of
         from flexmb.interchange.models import SID, held
         from flexmb.interchange.sid import sid_of, write_sid
         from flexmb.interchange.superelement import compared, interface_of, read_super_element, reduced

@@ -9,8 +9,8 @@ import typer
 from rich.text import Text
 
 from flexmb.cli.terminal import NoUserCode, SceneFile, console, no_traceback, range_of
+from flexmb.output.files import check_folder
 from flexmb.output.printable import printable
-from flexmb.output.writing import check_folder
 
 if TYPE_CHECKING:
     from flexmb.linear.linear_model import LinearModel

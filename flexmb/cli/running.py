@@ -5,20 +5,72 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 from rich.text import Text
+from typer import Option
 
-from flexmb.cli import run_options as o
 from flexmb.cli.terminal import EXIT_INTERRUPTED, EXIT_STOPPED, NoUserCode, SceneFile, Strict, console, no_traceback
-from flexmb.output.whole import whole_file
-from flexmb.output.writing import check_folder, folder
+from flexmb.integrate.integrator import Method
+from flexmb.output.files import check_folder, folder, whole_file
 from flexmb.scene.problems import closest
 
 if TYPE_CHECKING:
     from flexmb.run.trajectory import Trajectory
     from flexmb.scene.bodies import BeamBody
+
+
+METHODS = ", ".join(f"`{name}`" for name in get_args(Method))
+
+EndTime = Annotated[float, Option("--t-end", help="End of the run in s.", show_default=False)]
+StartTime = Annotated[float | None, Option("--from-time", help="Start of the run in s; default 0.", show_default=False)]
+Samples = Annotated[int, Option(help="Output times, equally spaced, both ends included.")]
+
+MethodName = Annotated[str, Option(help=f"{METHODS}: see docs/integrators.md. Fixed-step methods need `--step`.")]
+Relative = Annotated[float, Option(help="Relative tolerance for the error of a step.")]
+Absolute = Annotated[float, Option(help="Absolute tolerance for the error of a step, SI units.")]
+Step = Annotated[float | None, Option(help="Step in s (rk4, generalised_alpha).", show_default=False)]
+SpectralRadius = Annotated[
+    float | None, Option(help="Spectral radius of generalised_alpha; default 0.8.", show_default=False)
+]
+AlgorithmName = Annotated[
+    str,
+    Option(
+        help="`articulated` (recursion), `composite` (mass matrix), `frisch` (nested bodies, 1975) or "
+        "`frisch_as_printed`."
+    ),
+]
+
+Values = Annotated[
+    list[str] | None,
+    Option("--set", help="A value in the scene, `rod.mass_kg=2.0`; may be repeated.", show_default=False),
+]
+RestartFile = Annotated[
+    Path | None, Option(help="Resume from `restart.npz` of another run, bit-identically.", show_default=False)
+]
+
+Folder = Annotated[Path, Option("--out", "-o", help="Folder for trajectory.csv and charts.")]
+Also = Annotated[
+    list[str] | None,
+    Option(help="In addition to the CSV: `npz`, `parquet`, or `rrd` for the viewer rerun; may be repeated."),
+]
+Envelope = Annotated[
+    bool,
+    Option(
+        "--envelope",
+        help="Follow the run again over all of its steps; print the peaks of loads, write envelope.csv.",
+    ),
+]
+Plots = Annotated[bool, Option("--plots/--no-plots", help="Write charts beside the CSV.")]
+Sections = Annotated[
+    list[str] | None,
+    Option(help="Loads across a beam's sections, to sections-BEAM.csv: `BEAM`, or `BEAM:x,x,...` in m."),
+]
+ErrorEstimate = Annotated[
+    bool, Option("--error-estimate", help="Run again with tighter tolerances; print each channel's largest error.")
+]
+
 
 FORMATS = {"npz": "to_npz", "parquet": "to_parquet", "rrd": "to_rerun"}
 """Endings, and the methods of a trajectory that write them."""
@@ -29,23 +81,23 @@ SECTIONS = 21  # equally spaced, where no positions are given
 
 def simulate(
     scene: SceneFile,
-    t_end: o.EndTime,
-    out: o.Folder = Path("out"),
-    method: o.MethodName = "dop853",
-    rtol: o.Relative = 1e-10,
-    atol: o.Absolute = 1e-12,
-    step: o.Step = None,
-    spectral_radius: o.SpectralRadius = None,
-    from_time: o.StartTime = None,
-    values: o.Values = None,
-    restart: o.RestartFile = None,
-    samples: o.Samples = 201,
-    algorithm: o.AlgorithmName = "articulated",
-    envelope: o.Envelope = False,
-    also: o.Also = None,
-    plots: o.Plots = True,
-    sections: o.Sections = None,
-    error: o.ErrorEstimate = False,
+    t_end: EndTime,
+    out: Folder = Path("out"),
+    method: MethodName = "dop853",
+    rtol: Relative = 1e-10,
+    atol: Absolute = 1e-12,
+    step: Step = None,
+    spectral_radius: SpectralRadius = None,
+    from_time: StartTime = None,
+    values: Values = None,
+    restart: RestartFile = None,
+    samples: Samples = 201,
+    algorithm: AlgorithmName = "articulated",
+    envelope: Envelope = False,
+    also: Also = None,
+    plots: Plots = True,
+    sections: Sections = None,
+    error: ErrorEstimate = False,
     strict: Strict = False,
     no_user_code: NoUserCode = False,
 ) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import platform
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,11 +13,19 @@ from typing import Annotated
 import typer
 from rich.text import Text
 
+from flexmb.output.files import in_words
 from flexmb.output.printable import printable
 from flexmb.output.terminal import Terminal
-from flexmb.output.writing import in_words
+from flexmb.output.versions import version_of
 from flexmb.scene.problems import SceneError, SceneWarning
 from flexmb.scene.user_code import forbid_user_code
+
+
+def versions_text() -> str:
+    """Versions of this package, Python, and the libraries on which results and speed depend."""
+    lines = [f"flexmb {version_of('flexmb')}", f"Python {platform.python_version()}"]
+    return "\n".join([*lines, *(f"{name} {version_of(name)}" for name in ("numba", "numpy", "scipy"))])
+
 
 MOST_STEPS = 10_000  # of a range; each step computes a steady state
 EXIT_STOPPED = 1

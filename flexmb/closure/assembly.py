@@ -6,8 +6,8 @@ which modes add their strain energy with so large a factor that they do only wha
 moved along the closed states to the least strain energy of the change. Prescribed coordinates and speeds are not
 changed. Rows are weighted with a length of the scene, and compared with the size of their closure.
 
-Values that the user asked for (`flexmb.closure.asked`) are held if the remaining ones can close the loops. These are
-tried in turn: all given values are held; only insisted values are held; nothing is held. Only if all of this fails
+Values that the user asked for (`flexmb.closure.given_values`) are held if the remaining ones can close the loops. These
+are tried in turn: all given values are held; only insisted values are held; nothing is held. Only if all of this fails
 with the modes held, it is tried with modes that may change.
 """
 
@@ -18,9 +18,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.closure.asked import NO_HOLD, NOTHING_ASKED, AskedFor, KeptValues, Wishes
 from flexmb.closure.closures import ClosureError, Closures
 from flexmb.closure.factor import DEPENDENT
+from flexmb.closure.given_values import NO_HOLD, NOTHING_ASKED, AskedFor, KeptValues, Wishes
 from flexmb.closure.null_loads import GroupResponse
 from flexmb.closure.projection import CLOSED, MOVING_APART, OPEN
 from flexmb.tables.state import DynamicsError

@@ -10,7 +10,7 @@ import numpy as np
 from flexmb.control import loop
 from flexmb.control.loop_run import LoopRun, Starting
 from flexmb.control.measuring import sensors_by_time
-from flexmb.control.memory import LoopMemory
+from flexmb.control.schedule import LoopMemory
 from flexmb.integrate.problem import Accuracy, Clock
 from flexmb.tables.arguments import finite, vector
 from flexmb.typing import Real

@@ -1,14 +1,28 @@
-"""The schedule of sampled controllers: a table of their instants in order of time."""
+"""The schedule of sampled controllers, a table of their instants in order of time; and the memory of controllers at the
+end of a run, so that the run can be resumed there.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from flexmb.control.tables import APPLY, INSTANT, SAMPLE
 from flexmb.scene.control import Controller
 from flexmb.typing import Real, Record
+
+
+class LoopMemory(NamedTuple):
+    """signal (S,) and state of all controllers, laid out as in `flexmb.control.tables.Loop`; held (rows,m): outputs of
+    sampled controllers since t = 0; instants (1,): number of executed instants."""
+
+    signal: Real
+    state: Real
+    held: Real
+    instants: Real
+
 
 MOST = 10_000_000
 """Largest number of instants in a run: their table takes 0.4 GB."""

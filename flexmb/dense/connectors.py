@@ -10,8 +10,7 @@ from typing import Any, NamedTuple, assert_never
 
 import numpy as np
 
-from flexmb.dense.function_jets import profile
-from flexmb.dense.jets import MovingFrame, skew
+from flexmb.dense.jets import MovingFrame, profile, skew
 from flexmb.dense.members import DenseTree
 from flexmb.scene import schema as s
 from flexmb.scene.connectors import AlongHinge, BetweenNodes, actuator, by_stem

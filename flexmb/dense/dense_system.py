@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 from flexmb.dense.body_frames import InertiaPoints, Motions, member_frames, point_frames, points, seat_frame
 from flexmb.dense.connectors import Grip, grip, hold
 from flexmb.dense.first_order_bodies import FirstOrderBody, body_jacobian, first_order_body
-from flexmb.dense.function_jets import profile
 from flexmb.dense.hinge_frames import ball_energy, ball_torque
-from flexmb.dense.jets import MovingFrame
+from flexmb.dense.jets import MovingFrame, profile
 from flexmb.dense.members import DenseTree, ScalarSpeed, Seat, build
 from flexmb.kept import kept
 from flexmb.scene import schema as s

@@ -14,7 +14,7 @@ from flexmb.export.numbers import Numbers, numbers, with_inputs
 from flexmb.export.refusals import refuse
 from flexmb.jit.pointer import REAL, WHOLE
 from flexmb.run.run_arrays import Kind, labels
-from flexmb.run.switching import Timing, timing_of
+from flexmb.run.times import Timing, timing_of
 from flexmb.scene.connectors import AlongHinge
 from flexmb.scene.files import dumps
 from flexmb.scene.schema import Scene

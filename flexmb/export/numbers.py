@@ -20,8 +20,8 @@ from flexmb.parameters.numbers import Number
 from flexmb.scene.bodies import RigidBody
 from flexmb.scene.freedoms import AngularCoordinate, LinearCoordinate
 from flexmb.scene.functions import Constant, Function
+from flexmb.scene.keys import split_unit
 from flexmb.scene.schema import Load, Scene
-from flexmb.scene.units import split_unit
 from flexmb.typing import Real
 
 MOST = 256

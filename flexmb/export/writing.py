@@ -15,8 +15,8 @@ from flexmb.export.description import LICENSE, description
 from flexmb.export.model import ExportedModel, model
 from flexmb.export.refusals import NotExportable, c_compiler
 from flexmb.export.sources import core, example, fmi2, header
-from flexmb.output.whole import whole_file, write_whole
-from flexmb.output.writing import folder as made
+from flexmb.output.files import folder as made
+from flexmb.output.files import whole_file, write_whole
 from flexmb.scene.schema import Scene
 
 FLAGS = (

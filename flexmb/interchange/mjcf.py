@@ -13,10 +13,16 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from flexmb.interchange.imported import ImportedScene, ModelError, listed, naming
-from flexmb.interchange.joint_connectors import SMOOTH, STOPS, JointConnectors
-from flexmb.interchange.mjcf_closures import CONNECT, WELD, MjcfClosures
-from flexmb.interchange.mjcf_couplings import JOINT, TENDON, MjcfCouplings, tendon_that_acts
+from flexmb.interchange.imported import SMOOTH, STOPS, ImportedScene, JointConnectors, ModelError, listed, naming
+from flexmb.interchange.mjcf_equalities import (
+    CONNECT,
+    JOINT,
+    TENDON,
+    WELD,
+    MjcfClosures,
+    MjcfCouplings,
+    tendon_that_acts,
+)
 from flexmb.interchange.mjcf_text import refuse_bad_text
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.functions import Constant

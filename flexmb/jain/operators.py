@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flexmb.dense.dense_system import DenseSystem, Instant
-from flexmb.dense.function_jets import profile
+from flexmb.dense.jets import profile
 from flexmb.jain.elements import Configuration, phi, rate, undeformed, value, with_wheels
 from flexmb.kept import kept
 from flexmb.scene import schema as s

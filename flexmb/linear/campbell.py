@@ -15,12 +15,12 @@ from flexmb.linear.linear_model import Complex, LinearModel, Stability, modal_as
 from flexmb.linear.linearize import linear_model, looked_at
 from flexmb.linear.spin import spun
 from flexmb.linear.variations import Equations
-from flexmb.output.whole import whole_file
+from flexmb.output.files import whole_file
 from flexmb.scene.schema import Scene
 from flexmb.system.system import System
 from flexmb.system.watches import warn
 from flexmb.tables import arguments
-from flexmb.tables.brief import brief
+from flexmb.tables.named import brief
 from flexmb.tables.state import State
 from flexmb.typing import Real
 

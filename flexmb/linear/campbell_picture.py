@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from flexmb.linear.linear_model import Complex
+from flexmb.output.files import save_figure
 from flexmb.output.printable import chart_text
-from flexmb.output.whole import save_figure
 from flexmb.typing import Flags, Real
 
 _SIZE = (9.0, 7.0)  # inches

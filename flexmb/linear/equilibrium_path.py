@@ -31,7 +31,7 @@ from flexmb.scene.schema import Scene
 from flexmb.scene.values import with_values
 from flexmb.system.watches import of_states, warn
 from flexmb.tables import arguments
-from flexmb.tables.brief import brief
+from flexmb.tables.named import brief
 from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Real
 

@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import eig, matrix_balance
 
 from flexmb.kept import kept
-from flexmb.output.whole import whole_file
+from flexmb.output.files import whole_file
 from flexmb.tables import arguments
-from flexmb.tables.brief import brief
+from flexmb.tables.named import brief
 from flexmb.tables.state import State
 from flexmb.typing import Real
 

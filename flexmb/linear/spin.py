@@ -17,7 +17,7 @@ from flexmb.scene.schema import Revolute, Scene
 from flexmb.system.system import System
 from flexmb.system.watches import warn
 from flexmb.tables import arguments
-from flexmb.tables.brief import brief
+from flexmb.tables.named import brief
 from flexmb.tables.state import State
 
 DEPENDENT = 1e-9  # change of the accelerations with the angle, as part of the size of their derivatives

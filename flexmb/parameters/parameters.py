@@ -24,10 +24,10 @@ from flexmb.jit.duals import RATES
 from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR, VOID
 from flexmb.kept import kept
 from flexmb.parameters import kernels
+from flexmb.parameters.many_numbers import First, Steady, derivatives_together, steady
 from flexmb.parameters.numbers import Number, numbers
 from flexmb.parameters.plant import Plant
 from flexmb.parameters.spectral import WIDTHS, Derivative, NotSmooth, Parts, derivative
-from flexmb.parameters.steady import First, Steady, steady
 from flexmb.parameters.tables import (
     ParameterBlock,
     Tables,
@@ -40,7 +40,6 @@ from flexmb.parameters.tables import (
     structure,
     wholes,
 )
-from flexmb.parameters.together import derivatives_together
 from flexmb.scene.bodies import BeamBody
 from flexmb.scene.pieces import cuts
 from flexmb.scene.problems import SceneWarning

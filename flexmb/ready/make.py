@@ -29,7 +29,7 @@ from flexmb.jit import progress
 from flexmb.jit.folder import cache_directory
 from flexmb.jit.installed import MADE_BY, described, description
 from flexmb.jit.once import compiled_once
-from flexmb.output.whole import whole_file
+from flexmb.output.files import whole_file
 
 KERNELS = "*.kernel"
 UNUSED = 0  # modification time that marks unused files; reading a kernel sets another one

@@ -9,7 +9,7 @@ import numpy as np
 from flexmb.run.outputs import ending
 from flexmb.system.batch import Batch
 from flexmb.tables import arguments
-from flexmb.tables.brief import brief
+from flexmb.tables.named import brief
 from flexmb.tables.status import OK, Status
 from flexmb.typing import Index, Real
 

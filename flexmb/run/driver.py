@@ -16,18 +16,13 @@ import numpy as np
 from flexmb.integrate.memory import STRETCH, TIME, Memory
 from flexmb.integrate.settings import Settings
 from flexmb.integrate.watch import UNKNOWN, Watch
-from flexmb.run.agenda import Agenda
-from flexmb.run.chattering import FEW, Chattering
-from flexmb.run.event_memory import EventMemory
-from flexmb.run.event_record import EventRecord
-from flexmb.run.event_sides import DIRECTIONS, Sides
-from flexmb.run.initial_contacts import stand
-from flexmb.run.joining import joined
+from flexmb.run.agenda import DIRECTIONS, FEW, Agenda, Chattering, Sides, stand
+from flexmb.run.event_record import EventMemory, EventRecord
 from flexmb.run.origin import Beginning
 from flexmb.run.propagate import Raw, unmoved
 from flexmb.run.provenance import Making
 from flexmb.run.restart import Restart
-from flexmb.run.run_arrays import told
+from flexmb.run.run_arrays import joined, told
 from flexmb.run.segments import Segment, SegmentEnd, Segments
 from flexmb.run.situation import Situation
 from flexmb.run.trajectory import Trajectory
@@ -185,7 +180,7 @@ class Driver:
         return AfterEvents(raw, ends)
 
     def _stand(self, raw: Raw, found: Sequence[SceneEvent], y: Real) -> list[SceneEvent]:
-        """Process bodies in contact with stops, see `flexmb.run.initial_contacts`; returns the events that happened."""
+        """Process bodies in contact with stops, see `flexmb.run.agenda`; returns the events that happened."""
         struck = []
         for event in self._agenda.watched:
             is_new = event not in found and self._sides.came[event.name] == 0

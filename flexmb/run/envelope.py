@@ -9,10 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from flexmb.output.whole import write_csv
+from flexmb.output.files import write_csv
 from flexmb.run.run_arrays import Kind, RunArrays, labels
-from flexmb.tables.brief import brief
-from flexmb.tables.named import name_parts, parts_of
+from flexmb.tables.named import brief, name_parts, parts_of
 from flexmb.typing import Flags, Real
 
 VECTORS: dict[Kind, tuple[str, tuple[str, ...]]] = {

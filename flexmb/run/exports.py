@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from flexmb.output.whole import whole_file, write_csv
+from flexmb.output.files import whole_file, write_csv
 from flexmb.run.channels import channels_of, unit
 from flexmb.run.run_arrays import RunArrays
 from flexmb.system.section_loads import SectionLoads

@@ -21,13 +21,12 @@ from flexmb.integrate.settings import Settings
 from flexmb.integrate.watch import nothing_watched
 from flexmb.run.envelope import PartialEnvelope
 from flexmb.run.interruption import interruptible
-from flexmb.run.joining import joined
 from flexmb.run.origin import Beginning
 from flexmb.run.outputs import ending, observed
 from flexmb.run.peaks import INSIDE, part_of
 from flexmb.run.propagate import Integration, Raw, integrate, integration
-from flexmb.run.samples import sample_bytes
-from flexmb.run.switching import clock_of
+from flexmb.run.run_arrays import joined
+from flexmb.run.times import clock_of, sample_bytes
 from flexmb.run.trajectory import Trajectory
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.system import System

@@ -21,7 +21,7 @@ from flexmb.tables.state import DynamicsError, State, pack
 from flexmb.typing import Real
 
 if TYPE_CHECKING:
-    from flexmb.closure.impulses import RowMotion
+    from flexmb.closure.operators import RowMotion
 
 ROUNDING = 2.0**-52
 SAME = 1e-7  # relative to the largest component: smaller components of undetermined impulses count as zero
@@ -86,7 +86,7 @@ def _determined(values: Real, others: Real, rounding: float) -> Real:
 
 def _rows(system: System, state: State) -> RowMotion:
     """The rows of all closures."""
-    from flexmb.closure.impulses import RowMotion  # imported here because trees do not need it
+    from flexmb.closure.operators import RowMotion  # imported here because trees do not need it
 
     assert system.closures is not None  # it has rows
     return RowMotion(system.closures, state.t, pack(state))

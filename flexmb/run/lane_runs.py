@@ -31,7 +31,7 @@ from flexmb.jit.lanes import LANES
 from flexmb.jit.pointer import Pointer
 from flexmb.run.origin import Beginning
 from flexmb.run.propagate import NO_STATES, PARTS, Integration, kept_for_watches, recursion, room_for
-from flexmb.run.switching import segment_ends
+from flexmb.run.times import segment_ends
 from flexmb.system import algorithms
 from flexmb.system.batch import Batch, LaneTables, in_threads
 from flexmb.system.system import System

@@ -7,11 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.control.memory import LoopMemory
+from flexmb.control.schedule import LoopMemory
 from flexmb.integrate.memory import Memory
-from flexmb.run.event_memory import EventMemory
-from flexmb.run.restart import Restart
-from flexmb.run.restart_checks import fitting
+from flexmb.run.event_record import EventMemory
+from flexmb.run.restart import Restart, fitting
 from flexmb.scene.problems import closest
 from flexmb.system.system import System
 from flexmb.tables import arguments

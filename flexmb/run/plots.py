@@ -10,8 +10,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from flexmb.output.files import save_figure
 from flexmb.output.printable import chart_text
-from flexmb.output.whole import save_figure
 from flexmb.run.run_arrays import RunArrays
 from flexmb.typing import Real
 

@@ -22,8 +22,8 @@ from flexmb.motion import coordinates
 from flexmb.run.interruption import interruptible
 from flexmb.run.observing import Sampler, batch
 from flexmb.run.origin import Beginning
-from flexmb.run.restart_checks import refuse_other_division
-from flexmb.run.switching import clock_of
+from flexmb.run.restart import refuse_other_division
+from flexmb.run.times import clock_of
 from flexmb.scene.tree import watches_signals
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm, DynamicsAlgorithm, Route
@@ -34,7 +34,7 @@ from flexmb.typing import Index, Real
 
 if TYPE_CHECKING:
     from flexmb.control.feedback import Feedback
-    from flexmb.control.memory import LoopMemory
+    from flexmb.control.schedule import LoopMemory
     from flexmb.system.watches import StatesToKeep
 
 

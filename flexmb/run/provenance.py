@@ -1,9 +1,12 @@
-"""How a trajectory was computed: its system, for quantities that the run did not store, and a way to repeat the run."""
+"""How a trajectory was computed: its system, altered by events and with drives as controllers have set them, for
+quantities that the run did not store; and a way to repeat the run.
+"""
 
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,6 +14,7 @@ import numpy as np
 from flexmb.integrate.settings import FINEST_RTOL, Settings
 from flexmb.run.channels import channels_of, distance
 from flexmb.run.run_arrays import RunArrays
+from flexmb.scene.check.control import named
 from flexmb.system.system import System
 from flexmb.typing import Real
 
@@ -76,3 +80,25 @@ def _tighter(given: Settings) -> tuple[Settings, float]:
             f"{TIGHTER:g} times as tight; estimate the error of a run with rtol {TIGHTER * FINEST_RTOL:.1e} or more"
         )
     return replace(given, rtol=given.rtol / TIGHTER, atol=given.atol / TIGHTER, max_steps=10 * given.max_steps), 1.0
+
+
+def systems_at(run: RunArrays, made_by: Making) -> Iterator[System]:
+    """One system after the other, for each output of a run; with controllers it is used until the next one is asked
+    for."""
+    before, system = made_by.system, made_by.system
+    for i, t in enumerate(run.t.tolist()):
+        now = system_at(made_by, t)
+        if now is not before or (now.signals and i == 0):
+            before, system = now, _apart(now) if now.signals else now
+        for number, signal in system.signals.items():
+            at = named(signal.source)
+            assert at is not None  # the scene was checked
+            system.constants.function["data"][number, 0] = signal.gain * run.signals[at.name][i, at.number or 0]
+        yield system
+
+
+def _apart(system: System) -> System:
+    """The same with tables of its own, whose functions of time may be set. No feature of kernels depends on them."""
+    own = copy(system)
+    own.constants.function.setflags(write=True)
+    return own

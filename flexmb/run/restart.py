@@ -1,7 +1,8 @@
 """Restarts: a run that ended can be resumed by another call, or from a file by another process.
 
 A restart may come from a damaged file or may have been altered, and kernels do not check what they are given: so types,
-shapes, finite numbers and ranges of values are checked here, as far as they do not depend on the system.
+shapes, finite numbers and ranges of values are checked here, and that it belongs to the system and to the settings of
+the run before that is resumed.
 """
 
 from __future__ import annotations
@@ -14,24 +15,27 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from flexmb.control.memory import LoopMemory
+from flexmb.control.schedule import LoopMemory, instants, slack
+from flexmb.control.tables import SAMPLE
 from flexmb.integrate import memory as places
 from flexmb.integrate.catalogue import integrator
+from flexmb.integrate.control import stretch
 from flexmb.integrate.integrator import Method
 from flexmb.integrate.memory import DONE, NUMBERS, STRETCH, TAKEN_UP, TIME, Memory
-from flexmb.output.whole import whole_file
-from flexmb.run import event_memory
-from flexmb.run.event_memory import EventMemory
-from flexmb.scene.npz import REAL, TEXT, unpacked
-from flexmb.scene.reading import Unreadable
+from flexmb.output.files import whole_file
+from flexmb.run import event_record
+from flexmb.run.event_record import EventMemory
+from flexmb.scene.reading import REAL, TEXT, Unreadable, unpacked
 from flexmb.scene.schema import Scene
+from flexmb.scene.tree import watches_signals
+from flexmb.system.system import System
 from flexmb.tables import arguments
-from flexmb.tables.brief import brief
+from flexmb.tables.named import brief
 from flexmb.typing import Real
 
 VERSION = 1
 """Version of the file format; files without an entry are of version 1."""
-_NUMBERS = ("version", "t", "scene", *Memory._fields, *LoopMemory._fields, *event_memory.NAMES)
+_NUMBERS = ("version", "t", "scene", *Memory._fields, *LoopMemory._fields, *event_record.NAMES)
 _KINDS = {"method": TEXT} | dict.fromkeys(_NUMBERS, REAL)
 """The type of each array in the file, by name."""
 
@@ -74,7 +78,7 @@ class Restart:
                 file, version=VERSION, method=self.method, t=self.t,
                 scene=np.frombuffer(msgspec.json.encode(self.scene), np.uint8),
                 numbers=self.memory.numbers, y=self.memory.y, rows=self.memory.rows,
-                **{} if self.controllers is None else self.controllers._asdict(), **event_memory.written(self.events),
+                **{} if self.controllers is None else self.controllers._asdict(), **event_record.written(self.events),
             )  # fmt: skip
 
     @staticmethod
@@ -99,12 +103,12 @@ class Restart:
     def examined(self) -> Restart:
         """A copy, validated as far as possible without the system; ValueError or TypeError for invalid contents.
 
-        `flexmb.run.restart_checks` checks whether it belongs to a system.
+        `flexmb.run.restart` checks whether it belongs to a system.
         """
         self._refuse_other_parts()
         t, memory = _memory(self.method, self.t, self.memory)
         known = None if self.controllers is None else _controllers(self.controllers)
-        events = None if self.events is None else event_memory.examined(self.events, self.scene)
+        events = None if self.events is None else event_record.examined(self.events, self.scene)
         return replace(self, t=t, memory=memory, controllers=known, events=events)
 
     def _refuse_other_parts(self) -> None:
@@ -139,7 +143,7 @@ def _read(path: str | os.PathLike[str]) -> Restart:
     memory = Memory(*(file[name] for name in Memory._fields))
     is_controlled = any(name in file for name in LoopMemory._fields)
     known = LoopMemory(*(file[name] for name in LoopMemory._fields)) if is_controlled else None
-    events = event_memory.read(file) if scene.events else None
+    events = event_record.read(file) if scene.events else None
     return Restart(str(file["method"]), scene, float(file["t"]), memory, known, events)  # type: ignore[arg-type]  # examined
 
 
@@ -162,7 +166,7 @@ def _controllers(given: LoopMemory) -> LoopMemory:
     if held.ndim != 2:
         raise ValueError(f"held has the shape {held.shape}, but must have two dimensions, with one row per sample")
     happened = float(_finite("instants", given.instants, (1,))[0])
-    if not 0.0 <= happened < event_memory.MOST or happened != int(happened):
+    if not 0.0 <= happened < event_record.MOST or happened != int(happened):
         raise ValueError(f"instants is {happened:g}, but must be the number of times at which controllers have acted")
     return LoopMemory(
         _row("signal", given.signal).copy(), _finite("state", state, state.shape), _finite("held", held, held.shape),
@@ -179,7 +183,7 @@ def _refuse_other_numbers(numbers: Real, t: float) -> None:
         if value < 0.0:
             raise ValueError(f"numbers[{name}] is {value:g}, but must not be negative")
     done = numbers[DONE]
-    if done != np.floor(done) or done >= event_memory.MOST:
+    if done != np.floor(done) or done >= event_record.MOST:
         raise ValueError(f"numbers[DONE] is {done:g}, but must be a number of steps")
     if not numbers[STRETCH] <= numbers[TIME] <= t:
         raise ValueError(
@@ -198,3 +202,79 @@ def _row(name: str, values: Any) -> Real:
 def _finite(name: str, values: Any, shape: tuple[int, ...]) -> Real:
     """A copy of finite values of this shape; ValueError or TypeError for others."""
     return arguments.finite(name, arguments.shaped(name, values, shape)).copy()
+
+
+REMEDY = "; to start from its last state instead, give the state `last_state` of its trajectory"
+SAME_STEP = 1e-9  # fraction of a step by which the times of equal steps may differ
+
+
+def fitting(system: System, given: Restart, method: str) -> Restart:
+    """A copy of a restart of this system and method; ValueError or TypeError for any other."""
+    restart = given.examined()
+    if restart.method != method:
+        raise ValueError(f'the run to resume was made by method "{restart.method}": give the same{REMEDY}')
+    if restart.scene != system.scene:
+        raise ValueError(f'the run to resume was of scene "{restart.scene.name}" with other contents{REMEDY}')
+    motion, known = system.nq + system.nu + 1, restart.controllers
+    has_loop = bool(system.scene.controllers) or watches_signals(system.scene)
+    if has_loop != (known is not None):
+        raise ValueError(f"the restart has {'no' if has_loop else 'a'} memory of controllers: it is damaged")
+    if bool(system.scene.events) != (restart.events is not None):
+        said = "no" if system.scene.events else "a"
+        raise ValueError(f"the restart has {said} memory of events: it is damaged")
+    states = 0 if known is None else _refuse_other_controllers(system, restart, known)
+    if len(restart.memory.y) != motion + states:
+        raise ValueError(
+            f"the restart has {len(restart.memory.y)} numbers in y, but the run has {motion + states}: it is damaged"
+        )
+    return restart
+
+
+def refuse_other_division(memory: Memory, times: Real, segment_end: float, step: float) -> None:
+    """ValueError if a method of equal steps would continue with other steps than those of the run that stopped.
+
+    times (T,) s: output times; segment_end (s): end of the first segment; step (s): upper bound of the steps.
+    """
+    start, t, done = memory.numbers[[STRETCH, TIME, DONE]].tolist()
+    sample = times[min(np.searchsorted(times, t, side="right"), len(times) - 1)]
+    _, steps, h, _ = stretch.py_func(start, sample, segment_end, step)
+    if done >= max(steps, 1) or abs(start + done * h - t) > SAME_STEP * h + 4.0 * np.spacing(abs(t)):
+        raise ValueError(
+            f"the run to resume stopped at {t:.17g} s, after {done:.0f} equal steps from {start:.17g} s; this step and "
+            f"these output times result in other steps from there: give those of its own run{REMEDY}"
+        )
+
+
+def _refuse_other_controllers(system: System, restart: Restart, known: LoopMemory) -> int:
+    """ValueError for a memory of other controllers; returns the number of states of continuous controllers."""
+    from flexmb.control.wiring import widest, wired  # imported here because few scenes need it
+
+    wiring, scene = wired(system), system.scene
+    signals = max((place.stop for place in wiring.names.values()), default=0)
+    rows = len(known.held), widest(wiring.controller)
+    expected = {"signal": (signals,), "state": wiring.initial.shape, "held": rows}
+    for name, shape in expected.items():
+        found = getattr(known, name).shape
+        if found != shape:
+            raise ValueError(f"the restart has {name} of shape {found}, but the controllers {shape}: it is damaged")
+    for controller in scene.controllers:
+        if not np.isfinite(known.signal[wiring.names[controller.name]]).all():
+            raise ValueError(f'the restart has an output of controller "{controller.name}" that is not finite')
+    _refuse_other_instants(system, restart, known)
+    return len(wiring.continuous)
+
+
+def _refuse_other_instants(system: System, restart: Restart, known: LoopMemory) -> None:
+    """ValueError if controllers have not acted at all instants before `since`, or have acted after the end `t`."""
+    table, near = instants(system.scene.controllers, restart.since, restart.t, ()), slack(restart.since, restart.t)
+    happened = int(known.instants[0])
+    fewest = int(np.searchsorted(table["time"], restart.since - near))
+    most = int(np.searchsorted(table["time"], restart.t + near, side="right"))
+    if not fewest <= happened <= most:
+        raise ValueError(
+            f"the restart says that controllers have acted {happened} times by {restart.t:g} s, but they act "
+            f"{most} times: it is damaged"
+        )
+    samples = int(np.sum(table["kind"][:happened] == SAMPLE))
+    if len(known.held) < samples:
+        raise ValueError(f"the restart holds {len(known.held)} of {samples} samples: it is damaged")

@@ -1,9 +1,11 @@
-"""The arrays of one run, and the check that they are consistent: one row per time, with all components."""
+"""The arrays of one run: one row per time, with all components; the check that they are consistent, and two consecutive
+runs joined to one.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, Literal, NamedTuple, Protocol, TypeVar, assert_never
 
 import numpy as np
@@ -11,7 +13,7 @@ from numpy.typing import NDArray
 
 from flexmb.run.event_record import EventRecord
 from flexmb.run.restart import Restart
-from flexmb.scene.angles import Angles, angles_of
+from flexmb.scene.quaternions import Angles, angles_of
 from flexmb.system.observables import undetermined_loads
 from flexmb.tables import arguments
 from flexmb.tables.named import name_parts, parts_of
@@ -42,7 +44,7 @@ class MarkerPath:
     def angles(self, sequence: str = "zyx") -> Angles:
         """Angles (T,3) rad of a gimbal's `sequence` of axes, without jumps by whole turns, and where they are singular.
 
-        See `flexmb.scene.angles.angles_of`.
+        See `flexmb.scene.quaternions.angles_of`.
         """
         refuse_torn_path("path", self)
         angles = angles_of(self.quaternion, sequence)
@@ -295,3 +297,79 @@ def _vector(name: str, unit: str) -> list[tuple[str, str]]:
 
 def _spatial(name: str, parts: tuple[str, str], units: tuple[str, str]) -> list[tuple[str, str]]:
     return [*_vector(f"{name}.{parts[0]}", units[0]), *_vector(f"{name}.{parts[1]}", units[1])]
+
+
+SAME_NAMES = ("q_names", "u_names", "markers", "energy", *SPATIAL)
+
+
+def joined(first: Run, later: Run) -> Run:
+    """See `Trajectory.then`. The later run need not have an output at the end of the first one."""
+    for key in SAME_NAMES:
+        strange = set(getattr(first, key)) ^ set(getattr(later, key))
+        if strange:
+            names = ", ".join(sorted(map(str, strange)))
+            raise ValueError(f"the runs cannot be joined: only one of them has {key}: {names}")
+    if len(later.t) == 0:
+        return _ended(first, later)
+    kept = int(np.searchsorted(first.t, later.t[0]))
+    # the work of a resumed run already includes that of the first run
+    counted = first.work[-1] - later.work[0] if len(first.work) and later.work[0] == 0.0 else 0.0
+
+    def both(a: Real, b: Real) -> Real:
+        return np.concatenate([a[:kept], b])
+
+    def each(key: str) -> dict[str, Real]:
+        a, b = getattr(first, key), getattr(later, key)
+        return {name: both(a[name], b[name]) for name in b}
+
+    ways = (*(way._replace(until=min(way.until, float(later.t[0]))) for way in first.ways), *later.ways)
+    rows, of_items = ("t", "q", "u", "momentum"), ("energy", *SPATIAL)
+    arrays: dict[str, Any] = {key: both(getattr(first, key), getattr(later, key)) for key in rows}
+    arrays |= {key: each(key) for key in of_items} | {key: _of_some(first, later, kept, key) for key in SOME}
+    whole = replace(
+        first,
+        **arrays,
+        markers={name: _joined_path(first.markers[name], later.markers[name], kept) for name in later.markers},
+        work=both(first.work, later.work + counted),
+        ways=ways if first.ways and later.ways else (),
+    )
+    return _ended(whole, later)
+
+
+def _ended(whole: Run, later: Run) -> Run:
+    return replace(
+        whole, status=later.status, message=later.message, stopped_at=later.stopped_at,
+        restart=later.restart, events=whole.events + later.events,
+        statistics=_sum(whole.statistics, later.statistics),
+    )  # fmt: skip
+
+
+def _sum(a: Any, b: Any) -> Any:
+    """The sum of two `Statistics`."""
+    return type(a)(*(getattr(a, field.name) + getattr(b, field.name) for field in fields(a)))
+
+
+def _joined_path(a: MarkerPath, b: MarkerPath, kept: int) -> MarkerPath:
+    """The joined path of a marker, without a jump of the quaternion's sign."""
+    turned = kept > 0 and float(a.quaternion[kept - 1] @ b.quaternion[0]) < 0.0
+    b = replace(b, quaternion=-b.quaternion) if turned else b
+    return type(b)(*(np.concatenate([getattr(a, f.name)[:kept], getattr(b, f.name)]) for f in fields(b)))
+
+
+def _of_some(first: RunArrays, later: RunArrays, kept: int, key: str) -> dict[str, Real]:
+    """Joined drives, signals or powers, whose names and numbers of columns may differ between the runs.
+
+    Missing drives and powers are zero, because a coordinate that is not driven takes none; missing signals are NaN.
+    """
+    missing = np.nan if key == "signals" else 0.0
+    a, b, found = getattr(first, key), getattr(later, key), {}
+    for name in {**a, **b}:
+        width = max(outputs[name].shape[1] for outputs in (a, b) if name in outputs)
+        parts = []
+        for values, count in ((a, kept), (b, len(later.t))):
+            part = np.full((count, width), missing)
+            if name in values:
+                part[:, : values[name].shape[1]] = values[name][:count]
+            parts.append(part)
+        found[name] = np.concatenate(parts)
+    return found

@@ -24,8 +24,7 @@ from flexmb.run.propagate import integration, unmoved
 from flexmb.run.provenance import Making
 from flexmb.run.restart import Restart
 from flexmb.run.run_arrays import Way, told
-from flexmb.run.samples import refuse_large_run, sample_times
-from flexmb.run.switching import refuse_times
+from flexmb.run.times import refuse_large_run, refuse_times, sample_times
 from flexmb.run.trajectory import Trajectory
 from flexmb.scene.check import check_and_warn
 from flexmb.scene.problems import SceneWarning

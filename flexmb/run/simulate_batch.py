@@ -18,9 +18,8 @@ from flexmb.run.beside import computed
 from flexmb.run.interruption import interruptible
 from flexmb.run.lane_runs import BatchRun, Runs, runs
 from flexmb.run.propagate import NO_STATES
-from flexmb.run.samples import sample_times
 from flexmb.run.simulate import RunSettings, refuse_unknown, refuse_without_jacobian
-from flexmb.run.switching import refuse_times
+from flexmb.run.times import refuse_times, sample_times
 from flexmb.scene.problems import SceneWarning
 from flexmb.scene.schema import Scene
 from flexmb.scene.sizes import refuse_bytes

@@ -9,8 +9,8 @@ from typing import Any, Unpack
 from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
 from flexmb.run.origin import Given, start_time
-from flexmb.run.samples import refuse_large_run, sample_times
 from flexmb.run.simulate import RunPart, RunSettings, refuse_unknown, run_stages
+from flexmb.run.times import refuse_large_run, sample_times
 from flexmb.run.trajectory import Trajectory
 from flexmb.scene.check import check_and_warn, check_run
 from flexmb.scene.schema import Scene
@@ -18,7 +18,7 @@ from flexmb.system.algorithm import Algorithm
 from flexmb.system.compile import assembled
 from flexmb.system.system import System
 from flexmb.tables import arguments
-from flexmb.tables.brief import brief
+from flexmb.tables.named import brief
 from flexmb.typing import Real
 
 

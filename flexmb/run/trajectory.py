@@ -12,14 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from flexmb.kept import kept
-from flexmb.output.whole import write_csv
+from flexmb.output.files import write_csv
 from flexmb.run import exports
-from flexmb.run.at_outputs import systems_at
 from flexmb.run.envelope import Envelope, envelope
-from flexmb.run.joining import joined
 from flexmb.run.peaks import part_of
-from flexmb.run.provenance import Making, error_estimate, has_made, system_at
-from flexmb.run.run_arrays import MarkerPath, RunArrays, Way, refuse_torn
+from flexmb.run.provenance import Making, error_estimate, has_made, system_at, systems_at
+from flexmb.run.run_arrays import MarkerPath, RunArrays, Way, joined, refuse_torn
 from flexmb.scene.quaternions import quaternion_of
 from flexmb.system.load_axes import Axes, Redundant
 from flexmb.system.observables import ENERGIES, Observation

@@ -15,11 +15,10 @@ from numpy.typing import ArrayLike
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import ZERO
 from flexmb.scene.check import check_scene
-from flexmb.scene.collecting import make
+from flexmb.scene.collecting import BeamOptions, Placement, Sampling, make
 from flexmb.scene.convert import plain, to_struct
 from flexmb.scene.garbage import collector_paused
 from flexmb.scene.methods import AT_REST, SchemaMethods, angular, linear
-from flexmb.scene.options import BeamOptions, Placement, Sampling
 
 __all__ = ["SceneBuilder", "angular", "linear"]
 

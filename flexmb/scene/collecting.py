@@ -1,11 +1,15 @@
-"""Common base of the builders: makes structs of a scene from values named without units, and collects them by kind."""
+"""Common base of the builders: makes structs of a scene from values named without units, and collects them by kind.
+
+Keyword arguments of several methods, or rarely needed ones, are typed dictionaries: type checkers and editors know
+their names, calls refuse other names, and omitted ones have the defaults of the schema.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache, wraps
 from inspect import Parameter, isfunction, signature
-from typing import Any, ParamSpec, Self, TypeVar, get_args, get_type_hints
+from typing import Any, Literal, ParamSpec, Self, TypedDict, TypeVar, get_args, get_type_hints
 
 import msgspec
 from numpy.typing import ArrayLike
@@ -13,8 +17,54 @@ from numpy.typing import ArrayLike
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import ZERO
 from flexmb.scene.convert import ROOT, label, plain, to_struct
+from flexmb.scene.keys import split_unit
 from flexmb.scene.problems import closest
-from flexmb.scene.units import split_unit
+
+
+def refuse_others(what: str, names: Iterable[str], known: type) -> None:
+    """TypeError for a name that a typed dictionary does not declare, with the nearest name that it declares."""
+    for name in names:
+        if name not in known.__annotations__:
+            raise TypeError(f'{what} has no "{name}": {closest(name, known.__annotations__)}')
+
+
+class Placement(TypedDict, total=False):
+    """Hinge frames: nodes of parent and child, and fixed offsets from them (node axes, m)."""
+
+    parent_node: str
+    child_node: str
+    parent_position: ArrayLike
+    parent_quaternion: ArrayLike
+    child_position: ArrayLike
+    child_quaternion: ArrayLike
+
+
+class BeamOptions(TypedDict, total=False):
+    """Model of a beam, see `flexmb.scene.schema.BeamBody`: `theory`, `mass` matrix, inertia `points`; and rigid lumps
+    fixed to it, `tip_masses`."""
+
+    theory: Literal["euler-bernoulli", "timoshenko"]
+    mass: Literal["consistent", "lumped"]
+    points: Literal["line", "rotary", "section"]
+    tip_masses: Sequence[s.TipMass]
+
+
+class Sampling(TypedDict, total=False):
+    """Sampling of a controller: every `period` (s) from `offset` (s) on, with outputs that change `delay` (s) later;
+    without a period the controller is continuous."""
+
+    period: float | None
+    offset: float
+    delay: float
+
+
+class SectionShape(TypedDict, total=False):
+    """A beam section's torsion constant `J` (m⁴), `shear_factor`, and station `x` (m)."""
+
+    J: float | None
+    shear_factor: float
+    x: float
+
 
 P = ParamSpec("P")
 R = TypeVar("R")

@@ -12,8 +12,8 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from flexmb.scene.bodies import IDENTITY, ZERO, Matrix6, Quaternion, SceneStruct, Vector
 from flexmb.scene.functions import Function
+from flexmb.scene.keys import split_unit
 from flexmb.scene.quantities import NotNegative, Number, unit, within
-from flexmb.scene.units import split_unit
 
 __all__ = [
     "AngularFriction", "AngularSpring", "Bushing", "Connector", "LinearFriction", "LinearSpring", "SpringDamper",

@@ -9,9 +9,8 @@ from typing import Any, TypeVar
 import msgspec
 from msgspec import inspect
 
-from flexmb.scene.keys import bare
+from flexmb.scene.keys import bare, split_unit
 from flexmb.scene.problems import Defect, Place, SceneError, closest
-from flexmb.scene.units import split_unit
 
 Struct = TypeVar("Struct")
 

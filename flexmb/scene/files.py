@@ -17,7 +17,7 @@ from typing import Any
 
 import msgspec
 
-from flexmb.output.whole import write_whole
+from flexmb.output.files import write_whole
 from flexmb.scene.bodies import ModalBody, SidBody
 from flexmb.scene.convert import plain, to_struct
 from flexmb.scene.loaded import remember

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from flexmb.scene.bodies import InertiaPoint, ModalBody, ModalNode
 from flexmb.scene.convert import plain, to_struct
-from flexmb.scene.npz import read_arrays
+from flexmb.scene.reading import read_arrays
 from flexmb.scene.sizes import MOST_MODES
 from flexmb.typing import Real
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import msgspec
 from msgspec import inspect
 
-from flexmb.output.whole import write_whole
+from flexmb.output.files import write_whole
 from flexmb.scene.files import inline
 from flexmb.scene.keys import Key, kinds, number_keys
 from flexmb.scene.schema import Scene

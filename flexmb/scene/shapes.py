@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from flexmb.scene.bodies import BeamStation, Matrix3
-from flexmb.scene.options import SectionShape, refuse_others
+from flexmb.scene.collecting import SectionShape, refuse_others
 from flexmb.scene.sections import matrix
 
 

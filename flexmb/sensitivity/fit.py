@@ -22,8 +22,8 @@ from flexmb.integrate.settings import Settings
 from flexmb.kept import kept
 from flexmb.parameters.numbers import numbers
 from flexmb.run.driver import Leg
-from flexmb.run.samples import refuse_large_run
 from flexmb.run.simulate import RunSettings, refuse_unknown, run_with_course
+from flexmb.run.times import refuse_large_run
 from flexmb.run.trajectory import Trajectory
 from flexmb.scene.check import check_and_warn
 from flexmb.scene.problems import SceneError, SceneWarning, closest
@@ -31,11 +31,10 @@ from flexmb.scene.schema import Scene
 from flexmb.sensitivity.channels import Chosen, chosen, refuse_unknown_outputs
 from flexmb.sensitivity.gate import Admitted, admitted_to, again, prepared
 from flexmb.sensitivity.measurements import Measurements, measurements
-from flexmb.sensitivity.rows import aligned
 from flexmb.sensitivity.sensitivities import of_run
 from flexmb.system.system import System
 from flexmb.tables import arguments
-from flexmb.tables.brief import brief
+from flexmb.tables.named import brief
 from flexmb.tables.state import DynamicsError
 from flexmb.typing import Real
 
@@ -357,3 +356,12 @@ def _refuse_unknown_channels(trajectory: Trajectory, channels: Sequence[str]) ->
 def _refuse_unfinished(trajectory: Trajectory) -> None:
     if not trajectory.finished:
         raise DynamicsError(f"the run with the values of the scene does not finish: {trajectory.message}")
+
+
+def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    """One line for each row; the first column is aligned to the left, all others to the right."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        "  ".join([row[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(row[1:], widths[1:], strict=True))]).rstrip()
+        for row in rows
+    ]

@@ -11,17 +11,16 @@ import numpy as np
 from flexmb.building.numbering import speeds_at_least
 from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
-from flexmb.run.samples import refuse_large_run
 from flexmb.run.simulate import RunSettings, refuse_unknown, run_with_course
+from flexmb.run.times import refuse_large_run
 from flexmb.run.trajectory import Trajectory
 from flexmb.scene.check import check_and_warn
 from flexmb.scene.problems import closest
 from flexmb.scene.schema import Scene
 from flexmb.scene.sizes import refuse_bytes
-from flexmb.sensitivity.adjoint.whole import Adjoint
+from flexmb.sensitivity.adjoint.run_backwards import Adjoint
 from flexmb.sensitivity.channels import refuse_undetermined, refuse_unknown_outputs
-from flexmb.sensitivity.gate import admitted
-from flexmb.sensitivity.refusals import refuse_beyond_adjoint
+from flexmb.sensitivity.gate import admitted, refuse_beyond_adjoint
 from flexmb.sensitivity.scalars import ScalarTerm, terms_of
 from flexmb.sensitivity.sensitivities import METHODS
 from flexmb.tables import arguments

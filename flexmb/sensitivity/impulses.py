@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from flexmb.closure.factor import DEPENDENT
-from flexmb.closure.impulses import RowMotion
+from flexmb.closure.operators import RowMotion
 from flexmb.run.impulses import struck
 from flexmb.scene.tree import rate_name, scalar_paths
 from flexmb.sensitivity.leg import Course, Variation

@@ -16,7 +16,7 @@ from flexmb.run.driver import Leg
 from flexmb.run.interruption import interruptible
 from flexmb.run.outputs import ending
 from flexmb.run.propagate import Integration
-from flexmb.run.switching import clock_of
+from flexmb.run.times import clock_of
 from flexmb.sensitivity import flow
 from flexmb.sensitivity.blocks import Blocks, ObservedRates
 from flexmb.sensitivity.loops import Loops

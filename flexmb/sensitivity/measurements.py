@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flexmb.output.csv_cells import from_text, plain_number
+from flexmb.output.files import from_text, plain_number
 from flexmb.scene.reading import MIB, Unreadable, read_text
 from flexmb.tables import arguments
 from flexmb.typing import Real

@@ -18,7 +18,7 @@ import numpy as np
 
 from flexmb.sensitivity.measurements import Measurements, measurements
 from flexmb.tables import arguments
-from flexmb.tables.brief import brief
+from flexmb.tables.named import brief
 
 NODES = 4  # of Gauss's rule in each panel of an integral, which is exact for polynomials of degree 7
 MOST_PANELS = 100_000

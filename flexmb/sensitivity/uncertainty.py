@@ -16,11 +16,10 @@ import numpy as np
 from flexmb.integrate.integrator import Method
 from flexmb.run.simulate import RunSettings
 from flexmb.scene.schema import Scene
-from flexmb.sensitivity.fit import Fit
-from flexmb.sensitivity.rows import aligned
+from flexmb.sensitivity.fit import Fit, aligned
 from flexmb.sensitivity.sensitivities import Sensitivities, sensitivities
 from flexmb.tables import arguments
-from flexmb.tables.brief import brief
+from flexmb.tables.named import brief
 from flexmb.typing import Real
 
 SYMMETRIC = 1e-9  # relative difference of opposite entries of a correlation, and a negative eigenvalue, from rounding

@@ -5,7 +5,7 @@ mistaken for a difference between codes.
 """
 
 from flexmb.surrogate.cuts import cut_where_loaded as cut_where_loaded
+from flexmb.surrogate.lumping import rigidify as rigidify
 from flexmb.surrogate.points import modal_points as modal_points
-from flexmb.surrogate.rigidified import rigidify as rigidify
 from flexmb.surrogate.segments import finite_segments as finite_segments
 from flexmb.surrogate.substructures import substructured as substructured

@@ -10,10 +10,11 @@ from dataclasses import dataclass
 from typing import assert_never
 
 import numpy as np
+from msgspec.structs import replace
 
 from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.rest_curve import is_curved, rest_sections
-from flexmb.scene.schema import BeamBody, Body, ModalBody, Node, RigidBody, SidBody, TipMass, Vector
+from flexmb.scene.schema import BeamBody, Body, ModalBody, Node, RigidBody, Scene, SidBody, TipMass, Vector
 from flexmb.scene.sections import inertia_on_axis, mass_centres
 from flexmb.scene.tree import rest_frames
 from flexmb.typing import Real
@@ -149,3 +150,9 @@ def vector(values: Real) -> Vector:
     """Three numbers of an array as a scene has them."""
     x, y, z = (float(value) for value in values)
     return x, y, z
+
+
+def rigidify(scene: Scene) -> Scene:
+    """The scene with rigid bodies of the same inertia and nodes in place of flexible ones, without modal states."""
+    bodies = tuple(body if isinstance(body, SidBody) else rigid_equivalent(body) for body in scene.bodies)
+    return replace(scene, bodies=bodies, modal_states=())

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from flexmb.closure import dynamics as closed_dynamics
 from flexmb.closure import jacobian as closed_jacobian
-from flexmb.closure.asked import NOTHING_ASKED, AskedFor
 from flexmb.closure.assembly import consistent
 from flexmb.closure.branch import noticed, watch_steps
 from flexmb.closure.closures import ClosedMotion, ClosureError, Closures, Spread, called
 from flexmb.closure.constants import closure_constants, slowest_mode
 from flexmb.closure.derivative_call import ChainDerivativeCall, chain_derivative_call, differentiate_chain
+from flexmb.closure.given_values import NOTHING_ASKED, AskedFor
 from flexmb.closure.jacobian import chain_jacobian
 from flexmb.closure.leap import back, beside, leap
 from flexmb.closure.operators import ClosureOperators, closure_operators
@@ -32,8 +32,8 @@ from flexmb.scene import schema as s
 from flexmb.scene.problems import SceneWarning
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm, Route
-from flexmb.system.asking import Given, asked, everything
 from flexmb.system.derivative_evaluator import DerivativeRoute
+from flexmb.system.given_values import Given, asked, everything
 from flexmb.system.load_axes import Axes, Redundant
 from flexmb.system.mechanics import Mechanics
 from flexmb.system.observables import Evaluation

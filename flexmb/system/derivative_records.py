@@ -16,8 +16,7 @@ from flexmb.entry.observation import parts
 from flexmb.entry.variation import displacement_of
 from flexmb.kept import kept
 from flexmb.system.observables import ENERGIES, PARTS, Observation
-from flexmb.tables.brief import brief
-from flexmb.tables.named import name_parts
+from flexmb.tables.named import brief, name_parts
 from flexmb.typing import Real
 
 

@@ -12,9 +12,8 @@ from flexmb.modal.strain_field import StrainField
 from flexmb.scene.bodies import SidBody
 from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.tree import GROUND, node_names
-from flexmb.system.moved_sections import moved_sections
+from flexmb.system.moved_sections import moved_sections, rotation_along
 from flexmb.system.scene_arrays import SceneArrays
-from flexmb.system.turning_points import rotation_along
 from flexmb.typing import Real
 
 

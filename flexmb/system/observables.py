@@ -9,10 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flexmb.entry.observation import Outputs, outputs, parts, places, shapes
-from flexmb.scene.angles import Angles, angles_of
-from flexmb.scene.quaternions import quaternion_of
-from flexmb.tables.brief import brief
-from flexmb.tables.named import parts_of
+from flexmb.scene.quaternions import Angles, angles_of, quaternion_of
+from flexmb.tables.named import brief, parts_of
 from flexmb.tables.state import finite_result
 from flexmb.typing import Flags, Index, Real
 
@@ -34,7 +32,7 @@ class MarkerMotion:
         return quaternion_of(self.rotation)
 
     def angles(self, sequence: str = "zyx") -> Angles:
-        """Angles (3,) rad of a gimbal's `sequence` of axes: see `flexmb.scene.angles.angles_of`."""
+        """Angles (3,) rad of a gimbal's `sequence` of axes: see `flexmb.scene.quaternions.angles_of`."""
         return angles_of(self.quaternion, sequence)
 
 

@@ -24,10 +24,9 @@ from flexmb.scene.problems import SceneWarning
 from flexmb.scene.sections import ABOUT_Y, ABOUT_Z, EXTENSION, TWIST
 from flexmb.scene.tree import place_along
 from flexmb.system.frames import MotionTables, Pose, body_pose, closure_frames_of, hinge_frames_of, link_pose
-from flexmb.system.moved_sections import cross, moved_sections
+from flexmb.system.moved_sections import cross, moved_sections, rotation_along, turning
 from flexmb.system.observables import Evaluation
 from flexmb.system.scene_arrays import SceneArrays
-from flexmb.system.turning_points import rotation_along, turning
 from flexmb.tables import arguments
 from flexmb.tables.arrays import NODE_AXES, TORQUE, Workspace
 from flexmb.tables.state import finite_result

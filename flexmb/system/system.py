@@ -23,7 +23,7 @@ from flexmb.kept import kept
 from flexmb.motion import coordinates
 from flexmb.scene import schema as s
 from flexmb.scene.garbage import collector_paused
-from flexmb.system import algorithms, labels
+from flexmb.system import algorithms, given_values
 from flexmb.system.algorithm import Algorithm, DynamicsAlgorithm, Route
 from flexmb.system.derivative_evaluator import DerivativeEvaluator
 from flexmb.system.derivative_records import (
@@ -54,9 +54,9 @@ if TYPE_CHECKING:
     from flexmb.jain.operators import Operators, SpatialOperators
     from flexmb.parameters.parameters import Parameters
     from flexmb.parameters.regressor import InertiaRegressor
-    from flexmb.system.asking import Given
     from flexmb.system.batch import Batch, BatchAccelerations
     from flexmb.system.constraints import Constraints
+    from flexmb.system.given_values import Given
 
 _NO_CLOSURES = np.zeros((0, 6))
 
@@ -362,9 +362,9 @@ class System(Mechanics):
         return batch
 
     @kept
-    def state_names(self) -> tuple[labels.Names, labels.Names]:
+    def state_names(self) -> tuple[given_values.Names, given_values.Names]:
         """((name, unit) of every entry of q, the same of u)."""
-        return labels.names_of_states(self)
+        return given_values.names_of_states(self)
 
     def route(self, algorithm: Algorithm = "articulated", stabilise: float = 0.0) -> Route:
         """What a run needs of the algorithm; `stabilise` is for closed chains.

@@ -12,7 +12,7 @@ import numpy as np
 
 from flexmb.scene.problems import SceneWarning
 from flexmb.tables import arguments
-from flexmb.tables.brief import brief
+from flexmb.tables.named import brief
 from flexmb.tables.soundness import LONGEST, SHORTEST, unsound
 from flexmb.tables.status import Status
 from flexmb.typing import Index, Real

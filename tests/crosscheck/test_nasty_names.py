@@ -35,7 +35,7 @@ from crosscheck.running.scheduler import Event
 from crosscheck.terminal.listings import cases_table, engines_table
 from crosscheck.terminal.progress import LiveProgress
 from crosscheck.terminal.verdicts import print_outcome
-from flexmb.output.csv_cells import as_text, from_text
+from flexmb.output.files import as_text, from_text
 from flexmb.output.printable import chart_text, printable
 from tests.crosscheck.sessions import CASE, PROVIDER
 

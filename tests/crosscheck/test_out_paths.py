@@ -13,7 +13,7 @@ from crosscheck.records.archive import Archive, read
 from crosscheck.records.kinds import RunRecord
 from crosscheck.report import ci
 from flexmb import cli as flexmb_cli
-from flexmb.output.writing import check_folder
+from flexmb.output.files import check_folder
 from tests.crosscheck.sessions import CASE, sweep_here
 
 WIDE = {"COLUMNS": "200"}

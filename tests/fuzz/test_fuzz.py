@@ -156,11 +156,11 @@ NOT_OF_USERS = {
     "crosscheck/sealed/stamp.py:add_stamped": "replaces what is no table, and says nothing of it",
     "crosscheck/sealed/stamp.py:stamped": "what it has just encoded",
     "crosscheck/stability/map_records.py:identity": "a digest",
-    "flexmb/control/lookup.py": "sources of users' functions, which are run anyhow",
+    "flexmb/control/user.py": "sources of users' functions, which are run anyhow",
     "flexmb/export/sources.py:_shared": "files of the package",
     "flexmb/export/writing.py:_library": "what the compiler has just written",
     "flexmb/jit/": "kernels and their sources", "flexmb/output/readers.py:write": "writes",
-    "flexmb/output/whole.py:_settle": "writes",
+    "flexmb/output/files.py:_settle": "writes",
     "flexmb/run/warm_up.py:main": "what the process that started it has written",
     "flexmb/scene/values.py": "words of an option",
 }  # fmt: skip

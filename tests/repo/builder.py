@@ -15,8 +15,7 @@ from flexmb.scene.collecting import ALONE
 from flexmb.scene.connectors import NONE6
 from flexmb.scene.functions import Function
 from flexmb.scene.hinges import Z_AXIS
-from flexmb.scene.keys import fields, number_keys, parts
-from flexmb.scene.units import split_unit
+from flexmb.scene.keys import fields, number_keys, parts, split_unit
 
 FILE = Path(__file__).parents[2] / "flexmb" / "scene" / "methods.py"
 METHODS: dict[str, type[msgspec.Struct]] = {

@@ -11,8 +11,8 @@ from crosscheck.library.case import CaseError
 from crosscheck.library.mutations.edits import conjugated, multiplied, of_connector
 from crosscheck.library.mutations.mutation import DROPPED, FACTOR, Mutation, MutationTarget, SceneChange
 from flexmb.scene.connectors import Bushing, Connector, Matrix6, SpringDamper, by_stem
+from flexmb.scene.keys import split_unit
 from flexmb.scene.schema import Scene
-from flexmb.scene.units import split_unit
 
 STIFF, LOSING = ("stiffness", "stiffening", "loads"), ("damping", "sliding", "static", "stop_dissipation")
 DAMPING, REST, PRELOAD = ("damping", "stop_dissipation"), ("free_length", "rest"), ("preload",)

@@ -29,10 +29,10 @@ from crosscheck.library.mutations.edits import (
 from crosscheck.library.mutations.mutation import DROPPED, FACTOR, OPPOSITE, Mutation, MutationTarget, SceneChange
 from flexmb.scene.bodies import BeamBody, Body, ModalBody, RigidBody, SidBody
 from flexmb.scene.hinges import Free, Gimbal, Hinge, Spherical
+from flexmb.scene.keys import split_unit
 from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.schema import Scene
 from flexmb.scene.tree import Coordinate, coordinates
-from flexmb.scene.units import split_unit
 
 DEGREE = math.pi / 180.0
 ROUNDING = 1e-15

@@ -28,9 +28,9 @@ from flexmb.scene.connectors import (
     SpringDamper,
 )
 from flexmb.scene.functions import Function
+from flexmb.scene.keys import split_unit
 from flexmb.scene.schema import Coupling, Load, ModalState, Scene, Waiver
 from flexmb.scene.tree import coordinates, coupled
-from flexmb.scene.units import split_unit
 from flexmb.surrogate import modal_points
 from flexmb.typing import Real
 

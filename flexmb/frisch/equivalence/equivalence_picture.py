@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from flexmb.frisch.equivalence.comparison import Equivalence
+from flexmb.output.files import save_figure
 from flexmb.output.printable import chart_text
-from flexmb.output.whole import save_figure
 from flexmb.typing import Real
 
 _SIZE = (12.0, 7.0)  # inches

@@ -1,9 +1,9 @@
 """A body of a scene from a SID file: few point masses and modes with the same modal integrals.
 
 Every inertia integral of a SID file is a sum m a b of two fields a, b on the points: 1, coordinates of r, coordinates
-of phi_n. The masses of `flexmb.interchange.gram` therefore have the dynamics of the file at every level up to "full".
-Geometric stiffness, which is in the slopes of Ct, Cr and Oe of a SID file, is passed on as `gravity_stiffness` and
-`gradient_stiffness`, for level "stiffened".
+of phi_n. The masses of `flexmb.interchange.point_masses` therefore have the dynamics of the file at every level up to
+"full". Geometric stiffness, which is in the slopes of Ct, Cr and Oe of a SID file, is passed on as `gravity_stiffness`
+and `gradient_stiffness`, for level "stiffened".
 """
 
 from __future__ import annotations
@@ -14,11 +14,17 @@ from dataclasses import dataclass, replace
 import msgspec
 import numpy as np
 
-from flexmb.interchange.gram import EquivalentMasses, NoMasses, equivalent_masses
 from flexmb.interchange.imported import possible_inertia
-from flexmb.interchange.near_points import FARTHEST, NearPoints, points_with
+from flexmb.interchange.point_masses import (
+    FARTHEST,
+    EquivalentMasses,
+    NearPoints,
+    NoMasses,
+    equivalent_masses,
+    points_with,
+)
 from flexmb.interchange.sid.blocks import Sid, SidError, SidNode, Taylor
-from flexmb.interchange.sid.reader import read_sid
+from flexmb.interchange.sid.files import read_sid
 from flexmb.interchange.sid.sums import PRINTED, Scale, Sums, axial, largest, planar, second_moment
 from flexmb.modal.cross import cross_matrix
 from flexmb.modal.first_order import symmetric

@@ -18,9 +18,18 @@ import numpy as np
 from flexmb.interchange.imported import MAGNITUDE, usable
 from flexmb.interchange.superelement.element import SuperElement, SuperElementError, super_element
 from flexmb.interchange.superelement.matrix_market import both_halves, market_matrix, refuse_large
-from flexmb.interchange.superelement.meshes import Nodes, grid_nodes, inp_nodes, number_of_node
-from flexmb.interchange.superelement.nastran import NamedMatrix, Row, dmig_matrices, op4_matrices
-from flexmb.interchange.superelement.op4_binary import binary_op4_matrices, is_binary_op4
+from flexmb.interchange.superelement.nastran import (
+    NamedMatrix,
+    Nodes,
+    Row,
+    binary_op4_matrices,
+    dmig_matrices,
+    grid_nodes,
+    inp_nodes,
+    is_binary_op4,
+    number_of_node,
+    op4_matrices,
+)
 from flexmb.interchange.superelement.triplets import dof_rows, mapping_rows, triplets
 from flexmb.scene.reading import MIB, Unreadable, read_bytes, read_text, regular_size
 from flexmb.typing import Real

@@ -9,21 +9,51 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flexmb.interchange.gram import NoMasses
 from flexmb.interchange.imported import listed
-from flexmb.interchange.near_points import FARTHEST, RigidBlock, points_with
+from flexmb.interchange.point_masses import FARTHEST, NoMasses, RigidBlock, points_with
 from flexmb.interchange.superelement.element import ALIKE, DUST, MOTIONS, SuperElement, SuperElementError
-from flexmb.interchange.superelement.inertia import carried_sums
 from flexmb.interchange.superelement.interface import Interface, interface_of
+from flexmb.modal.cross import cross_matrix
 from flexmb.scene.bodies import Level, ModalBody
 from flexmb.scene.convert import plain, to_struct
 from flexmb.scene.modal_data import inertia_points
 from flexmb.typing import Real
+
+
+def carried_sums(element: SuperElement, position: Real, translation: Real, rotation: Real) -> Real:
+    """Sums (4+3m, 4+3m) over the masses of products of the fields 1, r, phi_n.
+
+    position (n,3) m of the nodes, translation and rotation modes (n,3,m).
+    """
+    n, _, m = translation.shape
+    shares = np.column_stack([np.ones(n), position, translation.transpose(0, 2, 1).reshape(n, 3 * m)])
+    arms = np.zeros((3, n, 4 + 3 * m))
+    arms[:, :, 1:4] = np.eye(3)[:, None]
+    arms[:, :, 4:] = np.moveaxis(cross_matrix(rotation.transpose(0, 2, 1)).reshape(n, 3 * m, 3), 2, 0)
+    turns = np.any(element.place[:, 3:] >= 0, axis=1)
+    fields = np.concatenate([shares, *arms[:, turns]])
+    return np.asarray(fields.T @ _kernel(element, turns) @ fields)
+
+
+def _kernel(element: SuperElement, turns: NDArray[np.bool_]) -> Real:
+    """Sums (n+3k, n+3k) of products of the shares of all nodes and the arms along x, y and z of the k that turn."""
+    padded = np.pad(element.M, ((0, 1), (0, 1)))  # index -1 selects zeros
+    move, turn = element.place[:, :3].T, element.place[turns, 3:].T
+
+    def block(rows: NDArray[np.int64], columns: NDArray[np.int64]) -> Real:
+        return padded[np.ix_(rows, columns)]
+
+    share = sum(block(rows, rows) for rows in move) / 3.0
+    mixed = [0.5 * (block(move[b], turn[c]) - block(move[c], turn[b])) for b, c in ((1, 2), (2, 0), (0, 1))]
+    half = 0.5 * sum(block(rows, rows) for rows in turn)
+    own = [[(half if a == b else 0.0) - block(turn[b], turn[a]) for b in range(3)] for a in range(3)]
+    return np.block([[share, *mixed], *([mixed[a].T, *own[a]] for a in range(3))])
+
 
 LOOSE = 1e-12
 """Pivots of K below this fraction of the diagonal are zero: there is a mechanism, or an unconnected part."""
@@ -302,3 +332,32 @@ def displacements(element: SuperElement, shapes: Real) -> Real:
     V = np.zeros((len(element.K), shapes.shape[2]))
     V[element.place[element.place >= 0]] = shapes[element.place >= 0]
     return V
+
+
+ONE_GROUP = 1e-6
+"""Relative difference of frequencies up to which modes of the structure are taken as a group, whose shapes can be any
+of their combinations."""
+BEYOND = 6  # modes of the structure above those that are asked for, in case a reduced one is in another order
+
+
+class SideBySide(NamedTuple):
+    """By mode of the body: its frequency, that of the structure's mode like it (Hz), and their MAC, from 0 to 1.
+
+    The modal assurance criterion (a' M b)² / (a' M a · b' M b) says how alike two shapes are.
+    """
+
+    reduced: Real
+    given: Real
+    mac: Real
+
+
+def compared(element: SuperElement, made: ReducedBody, count: int) -> SideBySide:
+    """The lowest `count` modes of a body beside those of the structure with the same ties and boundary."""
+    frequencies, modes = all_modes(element, made.interface, made.body.boundary, count + BEYOND)
+    V = displacements(element, made.shapes)[:, :count]
+    share = (V.T @ element.M @ modes) ** 2
+    share /= np.outer(np.einsum("im,ij,jm->m", V, element.M, V), np.einsum("im,ij,jm->m", modes, element.M, modes))
+    groups = np.abs(frequencies[:, None] - frequencies) <= ONE_GROUP * frequencies
+    share = share @ groups
+    best = np.argmax(share, axis=1)
+    return SideBySide(made.frequencies[:count], frequencies[best], share[np.arange(len(best)), best])

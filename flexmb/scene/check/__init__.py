@@ -9,16 +9,14 @@ from math import isfinite
 from flexmb.scene.check.beams import beams
 from flexmb.scene.check.connectors import connectors
 from flexmb.scene.check.control import control
-from flexmb.scene.check.couplings import couplings
 from flexmb.scene.check.events import events
 from flexmb.scene.check.exact_beams import jumps
-from flexmb.scene.check.hinges import closures, hinges, point_masses, wheels
+from flexmb.scene.check.hinges import closures, couplings, hinges, point_masses, wheels
 from flexmb.scene.check.inertia import rigid_bodies
 from flexmb.scene.check.modal import modal_bodies, modal_states
-from flexmb.scene.check.names import references, unique_names
+from flexmb.scene.check.names import references, tree, unique_names
 from flexmb.scene.check.outboard import moved_inertia
 from flexmb.scene.check.profiles import functions
-from flexmb.scene.check.topology import tree
 from flexmb.scene.check.walk import numbers
 from flexmb.scene.convert import refuse_wrong_types
 from flexmb.scene.garbage import collector_paused

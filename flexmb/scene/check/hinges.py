@@ -1,4 +1,6 @@
-"""Checks of coordinates (counts, springs, motors, prescribed motions), wheels, point masses, and axes of closures."""
+"""Checks of coordinates (counts, springs, motors, prescribed motions), wheels, point masses, axes of closures, and
+couplings: that they relate coordinates that exist, each once, and leave one free.
+"""
 
 from __future__ import annotations
 
@@ -17,8 +19,8 @@ from flexmb.scene.events import Release
 from flexmb.scene.freedoms import Coordinate
 from flexmb.scene.hinges import WITH_AXIS, Z_AXIS, Gimbal
 from flexmb.scene.problems import Defect, Place
-from flexmb.scene.schema import Scene, Wheel
-from flexmb.scene.tree import coordinates
+from flexmb.scene.schema import Coupling, Scene, Wheel
+from flexmb.scene.tree import Coupled, coordinates, coupled
 
 
 def hinges(scene: Scene) -> Iterator[Defect]:
@@ -125,3 +127,34 @@ def _wheel_inertia(place: Place, wheel: Wheel) -> Iterator[Defect]:
         what = f"the axial inertia {axial:g} exceeds twice the transverse inertia {transverse:g} kg m²"
         remedy = f"no wheel has this: the transverse inertia is {axial / 2.0:g} kg m² at least (a flat disc)"
         yield Defect(str(place.key("transverse_inertia_kg_m2")), what, remedy)
+
+
+NAME_IT = "name a hinge with angles or displacements, and the coordinate as the hinge does"
+
+
+def couplings(scene: Scene) -> Iterator[Defect]:
+    """Every coupling by itself. Redundant ones are allowed, as redundant closures are."""
+    for place, item in sound(scene, "couplings"):
+        coupling: Coupling = item
+        if not coupling.terms:
+            remedy = "name the coordinates that lead this one; a coordinate that is constant is prescribed, or a weld"
+            yield Defect(str(place.key("terms")), "no coordinate leads this one", remedy)
+            continue
+        try:
+            related = coupled(scene, coupling)
+        except ValueError as error:
+            yield Defect(str(place), str(error), NAME_IT)
+            continue
+        yield from _once(place, related)
+        if all(member.named.coordinate.prescribed is not None for member in related):
+            what = "all its coordinates are prescribed, and nothing is left that it could lead"
+            yield Defect(str(place), what, "leave the coupling out, or one of the prescribed motions")
+
+
+def _once(place: Place, related: tuple[Coupled, ...]) -> Iterator[Defect]:
+    seen: set[tuple[str, int]] = set()
+    for member in related:
+        if (member.hinge.name, member.place) in seen:
+            what = f'coordinate "{member.named.name}" of hinge "{member.hinge.name}" is named twice'
+            yield Defect(str(place), what, "name each coordinate once, with the sum of its ratios")
+        seen.add((member.hinge.name, member.place))

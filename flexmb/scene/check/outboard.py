@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from flexmb.scene.bodies import BeamBody, ModalBody, RigidBody, SidBody, Vector
+from flexmb.scene.check.inertia import reach
 from flexmb.scene.check.profiles import start_of
-from flexmb.scene.check.reach import reach
 from flexmb.scene.check.walk import entries
 from flexmb.scene.columns import column
 from flexmb.scene.freedoms import Ball, Coordinate, Floating, Freedom, ScalarFreedom

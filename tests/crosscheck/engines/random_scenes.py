@@ -10,8 +10,8 @@ from flexmb.scene.build import SceneBuilder, angular, linear
 from flexmb.scene.collecting import make
 from flexmb.scene.functions import Constant, Sine
 from flexmb.scene.hinges import WITH_AXIS
+from flexmb.scene.keys import split_unit
 from flexmb.scene.schema import AngularCoordinate, Gimbal, Hinge, LinearCoordinate, Node, Scene, Spherical
-from flexmb.scene.units import split_unit
 from tests.crosscheck.engines.randomise import randomise
 from tests.trees import LATER_KINDS as LATER_KINDS
 from tests.trees import REQUIRED, STRUCTS, scalar_coordinates

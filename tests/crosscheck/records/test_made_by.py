@@ -43,12 +43,12 @@ WITHOUT_PART = {
     "crosscheck.records.drawing": "holds what was drawn",
     "crosscheck.records.kinds": "holds the stored reference, which is made of other runs",
     "crosscheck.pytest_plugin": "finds our modules inside pytest, as Python would",
-    "flexmb.output.writing": "says what is wrong with a folder",
+    "flexmb.output.files": "says what is wrong with a folder",
     "crosscheck.running.scheduler": "says what a scheduler is", "crosscheck.running.processes": "ends processes",
     "crosscheck.records.made_by": "makes the key", "crosscheck.records.sources": "makes the key",
     "flexmb.surrogate": "makes scenes, as plan", "flexmb.scene.check": "refuses scenes, and changes none",
     "flexmb.scene.build": "makes scenes", "flexmb.scene.collecting": "makes scenes",
-    "flexmb.scene.methods": "makes scenes", "flexmb.scene.options": "makes scenes",
+    "flexmb.scene.methods": "makes scenes",
     "flexmb.scene.files": "reads scenes",
 }  # fmt: skip
 PLUG_IN = """

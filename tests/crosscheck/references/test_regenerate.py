@@ -292,7 +292,7 @@ def test_both_files_or_none(copied: Path, monkeypatch: pytest.MonkeyPatch) -> No
         replace(source, target)
 
     before = {file.name: file.read_bytes() for file in copied.iterdir()}
-    monkeypatch.setattr("flexmb.output.whole.os.replace", failing)
+    monkeypatch.setattr("flexmb.output.files.os.replace", failing)
     with pytest.raises(OSError, match="Input/output error"):
         regenerate(copied)
     assert len(calls) == 3, "the third puts back what the first had replaced"

@@ -9,8 +9,7 @@ from numpy.testing import assert_allclose
 
 import flexmb as fm
 from flexmb.advisor.ladder import highest_frequency, references, rungs
-from flexmb.advisor.models import LEVELS, BodyModel, built, levels
-from flexmb.advisor.sprung import fitted_hinge, spring_hinged
+from flexmb.advisor.models import LEVELS, BodyModel, built, fitted_hinge, levels, spring_hinged
 from flexmb.modal import flexible_model
 from flexmb.surrogate import modal_points
 from tests.flexmb.advisor.scenes import beam, loaded, turned

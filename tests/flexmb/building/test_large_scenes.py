@@ -17,7 +17,7 @@ from flexmb.scene.check import SceneError, check_scene
 from flexmb.scene.files import load_scene, save_scene
 from flexmb.scene.schema import Scene
 from flexmb.system.compile import assembled
-from flexmb.system.labels import names_of_states
+from flexmb.system.given_values import names_of_states
 from flexmb.tables.workspaces import workspace
 from tests import trees
 from tests.bounds import gamma

@@ -13,7 +13,7 @@ import flexmb
 from flexmb.dense import DenseSystem
 from flexmb.dense.body_frames import Motions
 from flexmb.dense.closures import relative_frame, rows, through_hinges
-from flexmb.dense.function_jets import profile
+from flexmb.dense.jets import profile
 from flexmb.scene import schema as s
 from flexmb.scene.hinges import WITH_AXIS
 from flexmb.scene.tree import rest_frames

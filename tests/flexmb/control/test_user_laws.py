@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 import flexmb as fm
 from flexmb.cli import app
-from flexmb.control.lookup import fault
+from flexmb.control.user import fault
 from flexmb.scene.files import dumps, loads, save_scene
 from flexmb.scene.user_code import VARIABLE
 from tests.flexmb.control import laws

@@ -14,7 +14,7 @@ import pytest
 import flexmb
 from flexmb.dense import DenseSystem
 from flexmb.dense.body_frames import Motions, member_frames, point_frames
-from flexmb.dense.function_jets import profile
+from flexmb.dense.jets import profile
 from tests import trees
 from tests.bounds import algebra, backward_error, gamma
 

@@ -6,8 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from flexmb.dense import DenseSystem
 from flexmb.dense.body_frames import Motions, member_frames, point_frames
-from flexmb.dense.function_jets import profile
-from flexmb.dense.jets import Jet, MovingFrame, rotation_exponential
+from flexmb.dense.jets import Jet, MovingFrame, profile, rotation_exponential
 from flexmb.scene import schema as s
 from tests.bounds import UNIT_ROUNDOFF, observed_order
 from tests.trees import Recipe, random_scene

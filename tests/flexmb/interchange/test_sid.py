@@ -11,7 +11,7 @@ import pytest
 
 import flexmb as fm
 from flexmb.dense.dense_system import DenseSystem
-from flexmb.interchange.gram import NoMasses, equivalent_masses
+from flexmb.interchange.point_masses import NoMasses, equivalent_masses
 from flexmb.interchange.sid import Sid, SidError, Taylor, imported_sid, read_sid, sid_of, write_sid
 from flexmb.modal.first_order import first_order
 from flexmb.modal.flexible import flexible_model

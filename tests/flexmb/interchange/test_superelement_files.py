@@ -10,9 +10,13 @@ import scipy.io
 import scipy.sparse
 
 from flexmb.interchange.superelement import SuperElementError, read_super_element
-from flexmb.interchange.superelement.meshes import grid_nodes, inp_nodes
-from flexmb.interchange.superelement.nastran import dmig_matrices, op4_matrices
-from flexmb.interchange.superelement.op4_binary import binary_op4_matrices
+from flexmb.interchange.superelement.nastran import (
+    binary_op4_matrices,
+    dmig_matrices,
+    grid_nodes,
+    inp_nodes,
+    op4_matrices,
+)
 from tests.flexmb.interchange import frames, made_matrices
 
 DATA = Path(__file__).parent / "data"

@@ -14,7 +14,7 @@ import pytest
 
 import flexmb
 from flexmb.dense import DenseSystem
-from flexmb.dense.function_jets import profile
+from flexmb.dense.jets import profile
 from flexmb.scene import schema as s
 from flexmb.system.observables import Evaluation
 from flexmb.system.system import System

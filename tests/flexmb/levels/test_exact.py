@@ -11,8 +11,8 @@ import pytest
 from scipy.optimize import brentq
 
 import flexmb
+from flexmb.dense.body_frames import section_frames
 from flexmb.dense.jets import Jet
-from flexmb.dense.section_frames import section_frames
 from flexmb.modal.beam import beam_elements
 from flexmb.modal.cross import cross_matrix
 from flexmb.modal.exact import exact_model

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from crosscheck.verify.columns import read_columns
-from flexmb.output.csv_cells import as_text, from_text, plain_number
-from flexmb.output.whole import write_csv
+from flexmb.output.files import as_text, from_text, plain_number, write_csv
 from flexmb.sensitivity.measurements import measurements
 
 NAMES = ("=1+1", "@SUM(A1)", "+x panel", "-y panel", "'=quoted", "''-twice", "'plain", "plain", "a=b", "")

@@ -16,14 +16,14 @@ import pytest
 
 import crosscheck
 import flexmb
-from flexmb.output.whole import clear_parts, take_away, whole_file, write_whole
+from flexmb.output.files import clear_parts, take_away, whole_file, write_whole
 from tests.repo.project import ROOT
 
 # Calls that write a file under the name that they are given.
 WRITERS = {"write_text", "write_bytes", "savefig", "savez", "savez_compressed", "savetxt", "savemat", "write_table"}
 # Who writes for a reason of its own, and why that may be torn.
 APART = {
-    "flexmb/output/whole.py": "it is the way",
+    "flexmb/output/files.py": "it is the way",
     "flexmb/jit/cache.py": "writes beside and replaces, each file with its digest",
     "crosscheck/records/archive.py": "appends lines, a torn one is cut off; what it rewrites is whole",
     "crosscheck/records/lock.py": "who holds a lock: of use to nobody after a kill",
@@ -49,7 +49,7 @@ def test_a_full_disk_leaves_what_was_there_and_the_error_names_the_file(tmp_path
     """Held to 1000 bytes a file, as by a quota."""
     write_whole(tmp_path / "a.txt", "before")
     code = (
-        "from pathlib import Path; from flexmb.output.whole import write_whole\n"
+        "from pathlib import Path; from flexmb.output.files import write_whole\n"
         "try: write_whole(Path('a.txt'), 'x' * 100000)\n"
         "except OSError as error: print(error.filename, error.strerror)"
     )
@@ -65,7 +65,7 @@ def test_a_kill_while_writing_leaves_what_was_there(tmp_path: Path) -> None:
     """And a part of a file by a name of its own, which the next session clears away."""
     write_whole(tmp_path / "a.txt", "before")
     code = (
-        "import os, signal; from pathlib import Path; from flexmb.output.whole import whole_file\n"
+        "import os, signal; from pathlib import Path; from flexmb.output.files import whole_file\n"
         "with whole_file(Path('a.txt')) as beside:\n"
         "    beside.write_text('half')\n"
         "    os.kill(os.getpid(), signal.SIGKILL)"
@@ -90,7 +90,7 @@ def test_what_is_no_file_is_written_to_as_it_is(tmp_path: Path) -> None:
     write_whole(Path(os.devnull), "gone")
     assert not Path(os.devnull).is_file()
     take_away(Path(os.devnull))
-    code = "from flexmb.output.whole import *; write_whole(Path('/dev/stdout'), 'x')"
+    code = "from flexmb.output.files import *; write_whole(Path('/dev/stdout'), 'x')"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
     assert done.stdout == "x"
     with pytest.raises(IsADirectoryError, match=str(tmp_path)):

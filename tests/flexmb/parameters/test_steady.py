@@ -9,9 +9,9 @@ import pytest
 
 import flexmb as fm
 from flexmb.parameters import parameters
+from flexmb.parameters.many_numbers import First, steady
 from flexmb.parameters.numbers import numbers
 from flexmb.parameters.parameters import Parameters
-from flexmb.parameters.steady import First, steady
 from tests.flexmb.parameters.test_together import BY, arm
 
 VALUES = {"a": 2.0, "b": 3.0, "c": 0.0}

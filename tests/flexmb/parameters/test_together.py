@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import flexmb as fm
-from flexmb.parameters import parameters, together
+from flexmb.parameters import many_numbers, parameters
 from flexmb.parameters.parameters import ParameterError
 from flexmb.parameters.spectral import Parts
 from flexmb.ready import scenes
@@ -58,7 +58,7 @@ def test_a_number_without_a_derivative_is_named():
 
 def test_entries_that_change_unexpectedly_break_up_the_group(monkeypatch):
     """Negative control: where the entries that a number concerns are not all known, its group is not used."""
-    plain = together._concerned
+    plain = many_numbers._concerned
 
     def incomplete(tables, number):
         found = plain(tables, number)
@@ -67,7 +67,7 @@ def test_entries_that_change_unexpectedly_break_up_the_group(monkeypatch):
         return found
 
     alone = np.column_stack([tables(arm(), [name]) for name in BY])
-    monkeypatch.setattr(together, "_concerned", incomplete)
+    monkeypatch.setattr(many_numbers, "_concerned", incomplete)
     assert np.max(np.abs(tables(arm(), BY) - alone)) < 1e-11 * np.max(np.abs(alone))
 
 
@@ -89,8 +89,8 @@ def test_two_points_suffice_only_where_entries_are_linear(bent, straight):
         a, b = (values.get(name, 2.0) for name in "ab")
         return np.array([1.0, bent(a), 5.0 * b])
 
-    found = together._linear(
-        tables, pair, [together._concerned(tables, each) for each in pair], [0, 1], Parts([slice(0, 3)])
+    found = many_numbers._linear(
+        tables, pair, [many_numbers._concerned(tables, each) for each in pair], [0, 1], Parts([slice(0, 3)])
     )
     assert (0 in found) is straight
     assert found[1].values == pytest.approx([0.0, 0.0, 5.0], rel=1e-14)

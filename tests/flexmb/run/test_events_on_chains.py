@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import flexmb as fm
-from flexmb.run import within_leaps
+from flexmb.run import segments
 from tests.flexmb.closure.mechanisms import windows
 from tests.repo.project import ROOT
 
@@ -223,6 +223,6 @@ def test_a_run_goes_on_from_events_beside_a_singular_position(level):
 
 def test_a_leap_of_unknown_length_moves_no_event(monkeypatch: pytest.MonkeyPatch) -> None:
     """NaN is neither shorter nor longer than the segment: the event happens when it is due, and nothing is tried."""
-    monkeypatch.setattr(within_leaps, "_longest_leap", lambda *given: np.nan)
+    monkeypatch.setattr(segments, "_longest_leap", lambda *given: np.nan)
     situation, raw = SimpleNamespace(system=None), SimpleNamespace(status=fm.Status.OK, t=1.0)
-    assert within_leaps.too_near(situation, None, raw, 0.0, 1.0) == 0.0  # type: ignore[arg-type]
+    assert segments.too_near(situation, None, raw, 0.0, 1.0) == 0.0  # type: ignore[arg-type]

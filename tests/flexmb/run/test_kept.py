@@ -5,7 +5,7 @@ import pytest
 
 import flexmb as fm
 import flexmb.run.propagate as propagation
-import flexmb.run.switching as switching
+import flexmb.run.times as switching
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.run import segments
 from flexmb.run.observing import observe

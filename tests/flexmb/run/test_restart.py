@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import flexmb as fm
-from flexmb.control.memory import LoopMemory
+from flexmb.control.schedule import LoopMemory
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.integrate.memory import DONE, FRESH, STEP, STRETCH, TIME, Memory
 from flexmb.run.warm_up import looped

@@ -11,8 +11,7 @@ from matplotlib.figure import Figure
 import flexmb as fm
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.run import plots
-from flexmb.run.samples import sample_bytes
-from flexmb.run.switching import timing
+from flexmb.run.times import sample_bytes, timing
 from flexmb.tables.status import Status
 from tests.benchmarks.rivals import rigid_chain
 from tests.trees import random_scene

@@ -8,8 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import flexmb as fm
-from flexmb.scene.angles import SEQUENCES, angles_of
-from flexmb.scene.quaternions import about, quaternion_of, rotation_by, rotation_matrix
+from flexmb.scene.quaternions import SEQUENCES, about, angles_of, quaternion_of, rotation_by, rotation_matrix
 from tests.bounds import UNIT_ROUNDOFF
 
 ROUNDING = 64 * UNIT_ROUNDOFF

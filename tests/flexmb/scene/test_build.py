@@ -12,9 +12,9 @@ from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder, angular
 from flexmb.scene.collecting import COLLECTIONS
 from flexmb.scene.connectors import NONE6
+from flexmb.scene.keys import split_unit
 from flexmb.scene.problems import SceneError
 from flexmb.scene.shapes import beam_section, cuboid_inertia, cylinder_inertia, inertia_moments
-from flexmb.scene.units import split_unit
 from tests.repo import builder
 
 UNIT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -61,7 +61,7 @@ def test_every_kind_has_a_method():
 
 @pytest.mark.parametrize("method", METHODS)
 def test_every_key_of_the_schema_is_an_argument(method):
-    """By name and without unit; what is gathered is typed by a dictionary of `flexmb.scene.options`."""
+    """By name and without unit; what is gathered is typed by a dictionary of `flexmb.scene.collecting`."""
     function = getattr(SceneBuilder, method)
     arguments = set(inspect.signature(function).parameters)
     for hint in get_type_hints(function).values():

@@ -14,8 +14,7 @@ from flexmb.modal.strain_field import StrainField
 from flexmb.scene.sections import transport
 from flexmb.scene.shapes import beam_section
 from flexmb.system.frames import hinge_frames, node_pose
-from flexmb.system.moved_sections import moved_sections
-from flexmb.system.turning_points import turning
+from flexmb.system.moved_sections import moved_sections, turning
 from tests.bounds import UNIT_ROUNDOFF
 from tests.flexmb.modal.coupled_references import coupled_stiffness, section_mass, station
 

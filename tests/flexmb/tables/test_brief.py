@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import flexmb as fm
-from flexmb.tables.brief import brief
+from flexmb.tables.named import brief
 
 LINES, WIDTH = 8, 100
 PLAIN = {"FinalValue", "TimeIntegral"}  # of numbers and names alone

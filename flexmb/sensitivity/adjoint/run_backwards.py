@@ -3,7 +3,7 @@
 The gradient that is carried backwards belongs to an extended state: the values at which events hold coordinates, y, and
 the signals and states of sampled controllers. What is left on the way belongs to the parameters. Directions are in the
 order of `StateDirections`. Events, instants of controllers, and channels at the instants of the scalar are
-differentiated along all of them by the dual numbers of `flexmb.sensitivity.passage`: they are few, beside the stages of
+differentiated along all of them by the dual numbers of `flexmb.sensitivity.parts`: they are few, beside the stages of
 steps.
 """
 
@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flexmb.control import loop
+from flexmb.control.feedback import Feedback
 from flexmb.integrate.control import ACCEPTED
 from flexmb.integrate.problem import Clock
 from flexmb.integrate.settings import Settings
@@ -26,12 +27,48 @@ from flexmb.scene.events import Latch
 from flexmb.sensitivity.adjoint.arc import Arc, IntegratedMotion, Plain, StepCost
 from flexmb.sensitivity.adjoint.part import PassedPart, StateDirections
 from flexmb.sensitivity.adjoint.sampling import SampledLoop
-from flexmb.sensitivity.adjoint.seeing import Seeing
+from flexmb.sensitivity.blocks import ObservedRates
+from flexmb.sensitivity.channels import Seen, channels, value
 from flexmb.sensitivity.gate import Admitted
 from flexmb.sensitivity.leg import Course, Variation, clock_of_leg
-from flexmb.sensitivity.passage import Passage
+from flexmb.sensitivity.parts import Passage
 from flexmb.sensitivity.scalars import Probe, ScalarTerm, TimeIntegral
 from flexmb.typing import Index, Real
+
+
+class ChannelRates:
+    """Some channels in one part of a run. along (n,D): the directions of the state."""
+
+    def __init__(self, variation: Variation, along: Real, names: Sequence[str], feedback: Feedback | None) -> None:
+        self._variation, self._along = variation, along
+        self._known = channels(variation.blocks.system, {} if feedback is None else feedback.names)
+        self._signals = any(name.startswith("signal.") for name in names)
+        self._names = list(dict.fromkeys(names))
+        system = variation.blocks.system
+        of_state = {name for names in system.state_names for name, _ in names} | {"work"}
+        self._observed = any(name not in of_state and not name.startswith("signal.") for name in self._names)
+
+    def at(self, t: float, y: Real) -> tuple[dict[str, float], dict[str, Real]]:
+        """Values, and derivatives (D,), by name of the channel, at the state y (n,)."""
+        observed = own = None
+        if self._observed:
+            observed = self._variation.observed_at(t, Course(y, self._along))
+            own = ObservedRates(observed.row, observed.row[:, None])
+        signals = of_signals = None
+        if self._signals and self._variation.loops is not None:
+            self._variation.take(Course(y, self._along))
+            of_signals, rates_of_signals = self._variation.loops.look(t)
+            signals, of_signals = rates_of_signals, of_signals[:, None]
+        seen, itself = Seen(self._along, observed, signals), Seen(y[:, None], own, of_signals)
+        values, rates = dict[str, float](), dict[str, Real]()
+        for name in self._names:
+            if name in self._known:
+                channel = self._known[name]
+                values[name] = value(self._variation.blocks.system, channel, name, itself)
+                rates[name] = channel(seen)
+            else:  # the load of a drive on a coordinate that is free here
+                values[name], rates[name] = 0.0, np.zeros(self._along.shape[1])
+        return values, rates
 
 
 class Left(NamedTuple):
@@ -101,7 +138,7 @@ class Adjoint:
                     arc = Arc(plain, motion, (y, clock), ends, self._settings, steps)
                 part = PassedPart(places, blocks, arc, start, at.Y, held)
                 states = [y] * len(ends) if arc is None else arc.states_at(ends)
-                seeing = Seeing(variation, places.along, self._names, solve.feedback)
+                seeing = ChannelRates(variation, places.along, self._names, solve.feedback)
                 self._see(part, seeing, sampling, own, due, dict(zip(ends, states, strict=True)))
                 if left is not None:
                     jumps = np.subtract(left.integrands, self._integrands(seeing, start, y))
@@ -113,7 +150,7 @@ class Adjoint:
         return found
 
     def _see(
-        self, part: PassedPart, seeing: Seeing, sampling: SampledLoop | None, probes: dict[float, list[Probe]],
+        self, part: PassedPart, seeing: ChannelRates, sampling: SampledLoop | None, probes: dict[float, list[Probe]],
         due: Sequence[float], states: dict[float, Real],
     ) -> None:  # fmt: skip
         """The instants of controllers and of the scalar in a part of the run, in order of time."""
@@ -162,7 +199,7 @@ class Adjoint:
                 probes.setdefault(probe.t, []).append(probe)
         return probes
 
-    def _added(self, seeing: Seeing, t: float, y: Real, probes: Sequence[Probe]) -> Real:
+    def _added(self, seeing: ChannelRates, t: float, y: Real, probes: Sequence[Probe]) -> Real:
         """The gradient (D,) that the scalar adds at one instant; its value there is added to `value`."""
         values, rates = seeing.at(t, y)
         total = np.zeros(self._places.size)
@@ -171,7 +208,7 @@ class Adjoint:
             total += probe.slope(values[probe.channel]) * rates[probe.channel]
         return total
 
-    def _integrands(self, seeing: Seeing, t: float, y: Real) -> list[float]:
+    def _integrands(self, seeing: ChannelRates, t: float, y: Real) -> list[float]:
         """The values of all integrands."""
         integrals = [term for term in self._terms if isinstance(term, TimeIntegral)]
         values = seeing.at(t, y)[0] if integrals else {}

@@ -1,5 +1,12 @@
-"""Reader of SID files of both dialects, with Fortran exponents, any letter case, comments, blank lines, and blocks in
-any order."""
+"""Reader and writer of SID files of two dialects, and how to tell these apart.
+
+"wallrapp": J is a 3 x 3 matrix, and the columns of Gr and Ge are ordered by mode, then axis, as in the textbooks.
+"fembs": J is the vector xx, yy, zz, xy, xz, yz, and the columns are ordered by axis, then mode, as FEMBS and programs
+after it write them. Files do not say which order theirs is; the redundancy of Gr and Ge with J and Cr does.
+
+Fortran exponents, any letter case, comments, blank lines, and blocks in any order are read; all blocks are written,
+with 17 digits, without the elements that are zero.
+"""
 
 from __future__ import annotations
 
@@ -7,15 +14,81 @@ import math
 import os
 import re
 from collections.abc import Iterator
-from typing import NamedTuple, NoReturn
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal, NamedTuple, NoReturn, assert_never
 
 import numpy as np
 
 from flexmb.interchange.imported import MAGNITUDE, usable
 from flexmb.interchange.sid.blocks import Sid, SidError, SidNode, Taylor, node_shapes, shapes
-from flexmb.interchange.sid.dialect import inertia_of_six, with_columns_by_mode
+from flexmb.modal.cross import cross_matrix
+from flexmb.modal.first_order import symmetric
+from flexmb.output.files import write_whole
 from flexmb.scene.reading import MIB, Unreadable, read_text
-from flexmb.typing import Real
+from flexmb.typing import Index, Real
+
+Dialect = Literal["wallrapp", "fembs"]
+SIX = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+"""The elements of J in a vector of six."""
+
+
+def inertia_of_six(six: Taylor) -> Taylor:
+    """J (3,3) from its vector (6,1)."""
+
+    def matrix(vector: Real) -> Real:
+        J = np.zeros((*vector.shape[:-1], 3, 3))
+        for place, (i, j) in enumerate(SIX):
+            J[..., i, j] = J[..., j, i] = vector[..., place]
+        return J
+
+    first = None if six.first is None else np.moveaxis(matrix(six.first[:, :, 0].T), 0, 1)
+    return Taylor(matrix(six.zero[:, 0]), first)
+
+
+def six_of_inertia(J: Taylor) -> Taylor:
+    """The vector (6,1) of J (3,3)."""
+    rows, columns = np.array(SIX).T
+    first = None if J.first is None else J.first.transpose(0, 2, 1)[rows, columns][:, :, None]
+    return Taylor(J.zero[rows, columns][:, None], first)
+
+
+def by_axis(block: Taylor) -> Taylor:
+    """Gr or Ge with columns by mode, then axis, as one with columns by axis, then mode."""
+    return _reordered(block, np.arange(block.zero.shape[1]).reshape(-1, 3).T.ravel())
+
+
+def by_mode(block: Taylor) -> Taylor:
+    """The inverse of `by_axis`."""
+    return _reordered(block, np.arange(block.zero.shape[1]).reshape(3, -1).T.ravel())
+
+
+def _reordered(block: Taylor, order: Index) -> Taylor:
+    return Taylor(block.zero[:, order], None if block.first is None else block.first[:, :, order])
+
+
+def with_columns_by_mode(J: Taylor, Cr: Taylor, Gr: Taylor, Ge: Taylor) -> tuple[Taylor, Taylor]:
+    """Gr and Ge of a file, whose columns have either order, with columns by mode.
+
+    The order is the one in which they agree better with J and Cr; columns by mode if there is no difference.
+    """
+    other = by_mode(Gr), by_mode(Ge)
+    return other if _gap(J, Cr, *other) < _gap(J, Cr, Gr, Ge) else (Gr, Ge)
+
+
+def _gap(J: Taylor, Cr: Taylor, Gr: Taylor, Ge: Taylor) -> float:
+    """By how much Gr and Ge, of columns by mode, contradict J and Cr: a sum of relative differences."""
+    m = len(Cr.zero)
+    torque = Gr.zero.reshape(3, m, 3).swapaxes(0, 1)
+    force = Ge.zero.reshape(m, m, 3)
+    pairs = [(0.5 * (torque - np.swapaxes(torque, 1, 2)), -cross_matrix(Cr.zero)), (force, -np.swapaxes(force, 0, 1))]
+    if J.first is not None:
+        pairs.append((symmetric(torque), np.moveaxis(J.first, 1, 0)))
+    if Cr.first is not None:
+        pairs.append((force, Cr.first - np.swapaxes(Cr.first, 0, 1)))
+    sizes = ((float(np.linalg.norm(a - b)), float(np.linalg.norm(a) + np.linalg.norm(b))) for a, b in pairs)
+    return sum(gap / size for gap, size in sizes if size > 0.0)
+
 
 LIMIT = 256 * MIB
 LARGEST = 2**26  # numbers in one block
@@ -256,3 +329,65 @@ class _Reader:
 def _mirrored(a: np.ndarray) -> np.ndarray:
     """A symmetric matrix, one half of which may be missing."""
     return np.where(a == 0.0, a.T, a)
+
+
+def write_sid(sid: Sid, path: str | os.PathLike[str], dialect: Dialect = "wallrapp") -> None:
+    """Write a SID file, in which the body has the name of the file, in one of the two dialects of `sid.dialect`."""
+    match dialect:
+        case "wallrapp":
+            written = sid
+        case "fembs":
+            written = replace(sid, J=six_of_inertia(sid.J), Gr=by_axis(sid.Gr), Ge=by_axis(sid.Ge))
+        case _:
+            assert_never(dialect)
+    write_whole(Path(path), "\n".join(_lines(written, " ".join(Path(path).stem.split()))) + "\n")
+
+
+def _lines(sid: Sid, name: str) -> Iterator[str]:
+    m = len(sid.modes)
+    yield f"{len(sid.nodes)} {m} : number of nodes, number of modes"
+    yield "part"
+    yield f"  new modal = {name}"
+    yield "    refmod"
+    yield f"      mass = {sid.mass:.17g}"
+    yield f"      nelastq = {m}"
+    for number, name in enumerate(sid.modes, 1):
+        yield f"      ielastq({number}) = {name}"
+    yield "    end refmod"
+    yield "    frame"
+    for node in sid.nodes:
+        yield from _node(node, m)
+    yield "    end frame"
+    for block in shapes(m):
+        yield from _taylor(block, getattr(sid, block), "    ")
+    yield "  end modal"
+    yield "end part"
+
+
+def _node(node: SidNode, m: int) -> Iterator[str]:
+    yield f"      new node = {node.name}"
+    yield "        rframe = body ref"
+    for block in node_shapes(m):
+        yield from _taylor(block, getattr(node, block), "        ")
+    yield "      end node"
+
+
+def _taylor(name: str, block: Taylor, indent: str) -> Iterator[str]:
+    rows, columns = block.zero.shape
+    yield f"{indent}{name}"
+    head = {
+        "order": 0 if block.first is None else 1,
+        "nrow": rows,
+        "ncol": columns,
+        "nq": 0 if block.first is None else block.first.shape[1],
+        "nqn": 0,
+        "structure": GENERAL,
+    }
+    for key, value in head.items():
+        yield f"{indent}  {key} = {value}"
+    for i, j in np.argwhere(block.zero):
+        yield f"{indent}  m0({i + 1},{j + 1}) = {block.zero[i, j]:.17g}"
+    if block.first is not None:
+        for i, k, j in np.argwhere(block.first):
+            yield f"{indent}  m1({i + 1},{k + 1},{j + 1}) = {block.first[i, k, j]:.17g}"
+    yield f"{indent}end {name}"

@@ -1,4 +1,6 @@
-"""The values that the initial state of a closed chain shall keep: those of its scene, or those named for a run."""
+"""Names and units of the entries of q and u of a system; and the values that the initial state of a closed chain shall
+keep: those of its scene, or those named for a run.
+"""
 
 from __future__ import annotations
 
@@ -9,12 +11,34 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flexmb.building.links import BodyLink
-from flexmb.closure.asked import AskedFor, Value, Wishes
+from flexmb.closure.given_values import AskedFor, Value, Wishes
 from flexmb.scene.bodies import IDENTITY
 from flexmb.scene.hinges import Free, Spherical
-from flexmb.system.labels import names_of_states
 from flexmb.system.scene_arrays import SceneArrays
 from flexmb.typing import Real
+
+Names = tuple[tuple[str, str], ...]
+
+
+def names_of_states(arrays: SceneArrays) -> tuple[Names, Names]:
+    """((name, unit) of every entry of q, the same of u)."""
+    scene = arrays.scene
+    q, u = [("", "")] * arrays.nq, [("", "")] * arrays.nu
+    for link in arrays.links:
+        hinge = link.hinge.name
+        in_q, in_u = link.kind.names(link.hinge)
+        q[arrays.coordinate(hinge)] = [(f"{hinge}.{name}", unit) for name, unit in in_q]
+        u[arrays.speed(hinge)] = [(f"{hinge}.{name}", unit) for name, unit in in_u]
+    for body in scene.bodies:
+        place = arrays.coordinate(f"{body.name}.modes")
+        modes = range(place.stop - place.start)
+        q[place] = [(f"{body.name}.mode[{n}]", "1") for n in modes]
+        u[arrays.speed(f"{body.name}.modes")] = [(f"{body.name}.mode_rate[{n}]", "1/s") for n in modes]
+    for wheel in scene.wheels:
+        q[arrays.coordinate(wheel.name)] = [(f"{wheel.name}.angle", "rad")]
+        u[arrays.speed(wheel.name)] = [(f"{wheel.name}.speed", "rad/s")]
+    return tuple(q), tuple(u)
+
 
 Given = Literal["guess", "scene", "state"] | NDArray[np.bool_]
 """Which values of a state must be kept: none, those that the scene gives, all, or those that are named (nq+nu+1,)."""

@@ -1,6 +1,11 @@
-"""Atomic writing of files: each is written under a temporary name beside its place and renamed at the end.
+"""Writing files: folders are checked before anything is computed, and errors of the disk name the file.
 
-If the process is killed, the disk is full or writing fails, the previous file remains.
+Each file is written under a temporary name beside its place and renamed at the end: if the process is killed, the disk
+is full or writing fails, the previous file remains.
+
+A cell of a CSV file that begins with =, +, - or @ is calculated when a table is opened, quoted or not, and can start
+programs. An apostrophe before it makes it a text: writers add one, readers take one away, so that every name is read as
+it was.
 """
 
 from __future__ import annotations
@@ -8,6 +13,7 @@ from __future__ import annotations
 import csv
 import errno
 import os
+import re
 import secrets
 import stat
 from collections.abc import Iterable, Iterator, Sequence
@@ -15,10 +21,31 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flexmb.output.csv_cells import as_text
-
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
+_FORMULA = re.compile(r"'*[=+\-@]")
+
+
+def as_text(name: str) -> str:
+    """The cell for a name."""
+    return f"'{name}" if _FORMULA.match(name) else name
+
+
+def from_text(cell: str) -> str:
+    """The name in a cell."""
+    return cell[1:] if cell.startswith("'") and _FORMULA.match(cell) else cell
+
+
+def plain_number(cell: str) -> float:
+    """The number in a cell, NaN too; ValueError for what only Python takes for one, such as 1_0 or other digits."""
+    word = cell.strip()
+    if not NUMBER.fullmatch(word) and word.lower() != "nan":
+        raise ValueError(word)
+    return float(word)
+
 
 PART = ".part-"  # prefix of temporary names
 _NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # disk full, quota exceeded, file too large
@@ -115,3 +142,37 @@ def _settle(file: Path, mode: int | None) -> None:
         os.fsync(stream.fileno())
     if mode is not None:
         file.chmod(mode)
+
+
+def check_folder(path: Path) -> None:
+    """OSError, with the remedy, unless `path` is a writable folder or can be created; it is not created here."""
+    above = next(folder for folder in (path, *path.absolute().parents) if os.path.lexists(folder))
+    if not above.is_dir():
+        raise OSError(errno.ENOTDIR, "this is not a folder, so no folder can be made in it: name another", str(above))
+    if not os.access(above, os.W_OK | os.X_OK):
+        raise OSError(errno.EACCES, "this folder cannot be written to: name another", str(above))
+
+
+def folder(path: Path) -> Path:
+    """`path` as a writable folder, created if necessary. An OSError says what prevents it, and the remedy."""
+    check_folder(path)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OSError(error.errno, f"this folder cannot be made ({error.strerror}): name another", str(path)) from None
+    return path
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Let an OSError of writing a file name it; that of a full disk by itself does not."""
+    try:
+        yield
+    except OSError as error:
+        what = f"{error.strerror}: the file is incomplete; free some space, or write elsewhere"
+        raise OSError(error.errno, what if error.errno == errno.ENOSPC else error.strerror, str(path)) from None
+
+
+def in_words(error: OSError) -> str:
+    """An OSError as one line without its number: the file, and what is wrong."""
+    return f"{error.filename}: {error.strerror}" if error.filename is not None else error.strerror or str(error)

@@ -1,20 +1,26 @@
-"""Equality constraints of MJCF models that relate coordinates: between joints, and of fixed tendons.
+"""Equality constraints of MJCF models: linear relations of coordinates become couplings, connect and weld closures.
 
-MuJoCo keeps q_1 - q_1,0 equal to a polynomial of q_2 - q_2,0, where q is a joint's coordinate or the length of a
-tendon, by default softly. What is linear becomes a coupling, which is exact; coordinates of scenes count from the
-reference already. A joint or tendon that is kept at a constant has no second one.
+MuJoCo keeps them softly by default, couplings and closures are exact. Between joints, and of fixed tendons, it keeps
+q_1 - q_1,0 equal to a polynomial of q_2 - q_2,0, where q is a joint's coordinate or the length of a tendon; coordinates
+of scenes count from the reference already. A joint or tendon that is kept at a constant has no second one.
+
+Between bodies, a connect holds the point data[0:3] of the first at the point data[3:6] of the second; a weld holds the
+point data[3:6] of the first, with the attitude data[6:10], at the point data[0:3] of the second. Between sites, these
+are the sites' frames.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.functions import Constant
+from flexmb.scene.hinges import ClosureKind
 from flexmb.scene.rounding import ROUNDING
+from flexmb.typing import Real
 
 JOINT, TENDON = 2, 3  # mjtEq
 OF_JOINT = 1  # mjtWrap
@@ -100,3 +106,62 @@ def tendon_that_acts(m: Any) -> str:
             if np.any(values):
                 return f'tendon "{m.tendon(k).name or k}" has {what}'
     return ""
+
+
+CONNECT, WELD = 0, 1  # mjtEq
+OF_SITES = 6  # mjtObj
+UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+class JoinedSide(NamedTuple):
+    """A frame on a body: its number, position (3,) m and quaternion."""
+
+    body: int
+    position: Real
+    quaternion: Real
+
+
+class MjcfClosures:
+    """The closures of a compiled model `m`; `body_name` gives the name of a body by its number."""
+
+    def __init__(self, m: Any, body_name: Callable[[int], str]) -> None:
+        self._name = body_name
+        self._closures: list[tuple[str, ClosureKind, JoinedSide, JoinedSide]] = []
+        self.inactive: list[str] = []
+        taken = {str(m.equality(i).name) for i in range(m.neq)}
+        for i in np.flatnonzero(np.isin(m.eq_type, (CONNECT, WELD))):
+            name = str(m.equality(i).name) or next(
+                name for name in (f"equality {i}", *(f"equality {i} {k}" for k in range(m.neq))) if name not in taken
+            )
+            if m.eq_active0[i]:
+                kind: ClosureKind = "spherical" if m.eq_type[i] == CONNECT else "weld"
+                self._closures.append((name, kind, *_sides(m, int(i))))
+            else:
+                self.inactive.append(name)
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return len(self._closures)
+
+    def close(self, builder: SceneBuilder) -> None:
+        """Add the closures."""
+        for name, kind, a, b in self._closures:
+            builder.closure(
+                name, kind, self._name(a.body), self._name(b.body), position_a=a.position, quaternion_a=a.quaternion,
+                position_b=b.position, quaternion_b=b.quaternion,
+            )  # fmt: skip
+
+
+def _sides(m: Any, i: int) -> tuple[JoinedSide, JoinedSide]:
+    one, other, data = int(m.eq_obj1id[i]), int(m.eq_obj2id[i]), np.array(m.eq_data[i])
+    if m.eq_objtype[i] == OF_SITES:
+        first, second = (
+            JoinedSide(int(m.site_bodyid[k]), np.array(m.site_pos[k]), np.array(m.site_quat[k])) for k in (one, other)
+        )
+    elif m.eq_type[i] == CONNECT:
+        first, second = JoinedSide(one, data[:3], UPRIGHT), JoinedSide(other, data[3:6], UPRIGHT)
+    else:
+        turned = data[6:10] / np.linalg.norm(data[6:10])
+        first, second = JoinedSide(one, data[3:6], turned), JoinedSide(other, data[:3], UPRIGHT)
+    return first, second
