@@ -17,10 +17,9 @@ from crosscheck.engines.functions_of_time import profile
 from crosscheck.records.drawing import CarriedPoint, Drawing, DrawnWheel, Line
 from flexmb.scene.bodies import ZERO, BeamBody, Body, ModalBody, RigidBody, SidBody, Vector
 from flexmb.scene.connectors import BetweenNodes, HingeSpring
-from flexmb.scene.ends import ends
 from flexmb.scene.rest_curve import rest_sections
 from flexmb.scene.schema import Marker, Scene, Wheel
-from flexmb.scene.tree import GROUND, node_frame, nodes_along
+from flexmb.scene.tree import GROUND, ends, node_frame, nodes_along
 from flexmb.typing import Real
 
 LARGEST_ASPECT = 12.0

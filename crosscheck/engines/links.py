@@ -21,7 +21,6 @@ from crosscheck.engines.conventions import (
 )
 from flexmb.scene.bodies import ZERO
 from flexmb.scene.connectors import BetweenNodes, Connector
-from flexmb.scene.ends import EndFrame, ends
 from flexmb.scene.freedoms import Ball, Floating, ScalarFreedom
 from flexmb.scene.functions import Function
 from flexmb.scene.schema import (
@@ -35,7 +34,7 @@ from flexmb.scene.schema import (
     SidBody,
     Wheel,
 )
-from flexmb.scene.tree import GROUND, coordinates, ordered
+from flexmb.scene.tree import GROUND, EndFrame, coordinates, ends, ordered
 from flexmb.surrogate.lumping import Inertia, combine, inertia_of, rigid_equivalent
 from flexmb.typing import Real
 

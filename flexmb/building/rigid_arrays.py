@@ -11,8 +11,7 @@ import numpy as np
 from flexmb.building.links import BodyLink, End
 from flexmb.building.models import Models
 from flexmb.levels.level import sixes
-from flexmb.modal.cross import cross_matrix
-from flexmb.scene.quaternions import rotation_matrix
+from flexmb.scene.quaternions import cross_matrix, rotation_matrix
 from flexmb.typing import Real
 
 

@@ -33,8 +33,7 @@ from flexmb.closure.forces import accelerate, free_tree, row_loads
 from flexmb.closure.projection import OPEN, close
 from flexmb.closure.rows import largest_gap
 from flexmb.integrate.control import Interval
-from flexmb.integrate.leap import cubic
-from flexmb.integrate.lobatto import EDGE_WEIGHT, INNER, INNER_WEIGHT
+from flexmb.integrate.leap import EDGE_WEIGHT, INNER, INNER_WEIGHT, cubic
 from flexmb.jain.balance import power
 from flexmb.jit.kernel import helper, kernel, sweep
 from flexmb.motion.coordinates import load_state, put_back, store_slope

@@ -18,8 +18,7 @@ import numpy as np
 from flexmb.control import tables as a
 from flexmb.control.loop import accelerate, give, keep_good, steer, take
 from flexmb.integrate.control import Interval, copy
-from flexmb.integrate.leap import cubic
-from flexmb.integrate.lobatto import EDGE_WEIGHT, INNER, INNER_WEIGHT
+from flexmb.integrate.leap import EDGE_WEIGHT, INNER, INNER_WEIGHT, cubic
 from flexmb.jit.direct import real_at, status_at
 from flexmb.jit.kernel import helper, kernel, sweep
 from flexmb.tables.status import OK

@@ -20,8 +20,7 @@ from flexmb.modal.strain_field import StrainField
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import IDENTITY, ZERO, Quaternion, Vector
 from flexmb.scene.connectors import BetweenNodes
-from flexmb.scene.ends import ends
-from flexmb.scene.tree import GROUND, coordinates, ordered, rest_frames
+from flexmb.scene.tree import GROUND, coordinates, ends, ordered, rest_frames
 from flexmb.typing import Real
 
 LEVELS = ("rigid", "ruthless", "linear", "full", "stiffened", "exact")

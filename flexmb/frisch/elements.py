@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexmb.modal.cross import cross_matrix
 from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.modal.integrals import TurningPoints
+from flexmb.scene.quaternions import cross_matrix
 from flexmb.typing import Real
 
 

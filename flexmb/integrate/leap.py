@@ -6,6 +6,7 @@ The methods then approach it by smaller steps until the problem itself can leap 
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 from flexmb.integrate.control import ACCEPTED, EVALUATIONS, Interval, copy
@@ -13,6 +14,11 @@ from flexmb.integrate.dense_output import store_samples
 from flexmb.integrate.watch import CROSSED, pause, watches
 from flexmb.jit.kernel import handed_on, helper, kernel
 from flexmb.tables.status import BRANCH_UNKNOWN, CLOSURE_OPEN, CLOSURE_SINGULAR, OK
+
+# Lobatto's rule of order 6 on a unit interval: both ends with weight 1/12, and INNER from either with 5/12.
+INNER = 0.5 - math.sqrt(0.05)
+EDGE_WEIGHT, INNER_WEIGHT = 1.0 / 12.0, 5.0 / 12.0
+
 
 EVALUATED = 8  # approximate number of evaluations of the equations of motion in a leap
 

@@ -15,6 +15,8 @@ from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.memory import ERROR_BEFORE, FACTORED, FRESH, RENEW, RETRIED, STEP, STEP_BEFORE
 from flexmb.integrate.radau5_stages import (
     ITERATIONS,
+    REAL,
+    E,
     evaluate_polynomial,
     factorise,
     guess,
@@ -23,7 +25,6 @@ from flexmb.integrate.radau5_stages import (
     scratch,
     solve,
 )
-from flexmb.integrate.radau5_tableau import REAL, E
 from flexmb.integrate.settling import settle
 from flexmb.integrate.stiff_place import begin_without_jacobian, give_up, keep_place, recall_place, suffices
 from flexmb.integrate.watch import Ends

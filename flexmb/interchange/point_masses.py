@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.modal.cross import cross_matrix
+from flexmb.scene.quaternions import cross_matrix
 from flexmb.typing import Real
 
 NEGATIVE = 1e-6

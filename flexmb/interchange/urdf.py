@@ -107,10 +107,7 @@ class Mimics:
 
     def _number(self, place: str, element: ElementTree.Element, key: str, usual: float) -> float:
         text = element.get(key)
-        try:
-            value = usual if text is None else float(text) if text.isascii() and "_" not in text else math.nan
-        except ValueError:
-            value = math.nan
+        value = usual if text is None else _real(text)
         if not usable(value):
             self._fail(place, f"{key} of its mimic element is {text!r}", "give a number in SI units")
         return value

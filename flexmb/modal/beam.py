@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexmb.modal.cross import cross_matrix
 from flexmb.modal.interpolation import BendingField, ElementMesh, LineField
 from flexmb.modal.section import SectionTable, section_table
 from flexmb.modal.stations import Lump, Stations, quadrature
 from flexmb.scene.bodies import FAMILIES, BeamBody
+from flexmb.scene.quaternions import cross_matrix
 from flexmb.scene.strains import families
 from flexmb.typing import Real
 

@@ -12,7 +12,6 @@ from functools import lru_cache
 import msgspec
 import numpy as np
 
-from flexmb.modal.cross import cross_matrix
 from flexmb.modal.eigenproblem import eigenpairs, refined
 from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode, undeforming_node
 from flexmb.modal.following import followed
@@ -24,7 +23,7 @@ from flexmb.scene.bodies import IDENTITY, BeamBody, Quaternion
 from flexmb.scene.collocation import gauss_rule
 from flexmb.scene.pieces import edges as piece_edges
 from flexmb.scene.pieces import piece_count
-from flexmb.scene.quaternions import rotation_matrix
+from flexmb.scene.quaternions import cross_matrix, rotation_matrix
 from flexmb.scene.rest_curve import rest_sections
 from flexmb.scene.strains import Strain, points_of_piece, polynomials
 from flexmb.typing import Index, Real

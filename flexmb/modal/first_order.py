@@ -18,8 +18,8 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from flexmb.modal.cross import cross_matrix
 from flexmb.modal.flexible_model import FlexibleModel
+from flexmb.scene.quaternions import cross_matrix
 from flexmb.typing import Real
 
 _BLOCK = 2**18  # vectors (one for each point and pair of modes) held in memory at once: 6 MB an array

@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flexmb.modal.cross import cross_matrix
 from flexmb.modal.flexible_model import FlexibleModel, SecondOrder, join_second
+from flexmb.scene.quaternions import cross_matrix
 from flexmb.typing import Index, Real
 
 

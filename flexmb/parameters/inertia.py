@@ -23,7 +23,7 @@ import numpy as np
 from flexmb.building.links import BodyLink
 from flexmb.jit.bundle import bundle
 from flexmb.jit.strips import ROW, strip_zeros
-from flexmb.modal.cross import cross_matrix
+from flexmb.scene.quaternions import cross_matrix
 from flexmb.tables.arrays import Constants
 from flexmb.typing import Index, Real
 

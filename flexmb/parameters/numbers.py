@@ -8,7 +8,7 @@ from typing import Any
 
 from flexmb.kept import kept
 from flexmb.scene.schema import Scene
-from flexmb.scene.values import PathError, changed_at, with_values
+from flexmb.scene.values import PathError, values_at, with_values
 
 NEARBY = 2.0**-6
 """Change of a number, relative to its scale, by which one sees what depends on it."""
@@ -21,13 +21,7 @@ class Number:
         """PathError where the scene has no such number, or what is there is no real number."""
         if not isinstance(name, str):
             raise TypeError(f"a parameter is named by a string, not by {name!r}: write a path such as rod.mass_kg")
-        values = list[float]()
-
-        def look(value: Any) -> Any:
-            values.append(_real(value, name))
-            return value
-
-        changed_at(scene, name, look)
+        values = [_real(value, name) for value in values_at(scene, name)]
         if len(set(values)) > 1:
             raise PathError(
                 f'parameter "{name}" has the values {", ".join(f"{value:g}" for value in values[:4])}: name one of its '
@@ -68,20 +62,12 @@ class Number:
         steps = self.name.split(".")
         neighbours = [0.0]
         if steps[-5:-4] == ["stations"] and steps[-2].isdecimal() and steps[-1].isdecimal():
-
-            def beside(value: Any) -> Any:
-                i, j = map(int, steps[-2:])
-                neighbours.append(math.sqrt(abs(value[i][i] * value[j][j])))
-                return value
-
-            changed_at(self._scene, ".".join(steps[:-2]), beside)
+            i, j = map(int, steps[-2:])
+            matrices = values_at(self._scene, ".".join(steps[:-2]))
+            neighbours += [math.sqrt(abs(matrix[i][i] * matrix[j][j])) for matrix in matrices]
         elif steps[-1].isdecimal():
-
-            def look(value: Any) -> Any:
-                neighbours.extend(abs(number) for number in value if isinstance(number, float))
-                return value
-
-            changed_at(self._scene, ".".join(steps[:-1]), look)
+            arrays = values_at(self._scene, ".".join(steps[:-1]))
+            neighbours += [abs(number) for array in arrays for number in array if isinstance(number, float)]
         return max(abs(self.value), *neighbours) or 1.0
 
 

@@ -180,7 +180,7 @@ def envelope(run: RunArrays, parts: Sequence[PartialEnvelope]) -> Envelope:
         whole.add(part)
     channels = []
     for (kind, name), found in whole.columns.items():
-        for i, (label, unit) in enumerate(labels(run, kind, name, len(found.least))):
+        for i, (label, unit) in enumerate(labels(kind, name, len(found.least), run)):
             channels.append((label, unit, part_of_extremes(found, slice(i, i + 1))))
     units = {"torque": "N m", "force": "N", "position": "m", "velocity": "m/s", "angular_velocity": "rad/s",
              "acceleration": "m/s^2", "angular_acceleration": "rad/s^2"}  # fmt: skip

@@ -158,7 +158,7 @@ class RunArrays:
         refuse_torn(self)
         yield "t", "s", self.t
         for kind, part, values in arrays_of(self):
-            for i, (name, unit) in enumerate(labels(self, kind, part, values.shape[1])):
+            for i, (name, unit) in enumerate(labels(kind, part, values.shape[1], self)):
                 yield name, unit, values[:, i]
 
 
@@ -203,13 +203,12 @@ class StateNames(Protocol):
     def u_names(self) -> tuple[tuple[str, str], ...]: ...
 
 
-def labels(run: StateNames, kind: Kind, name: str, width: int) -> list[tuple[str, str]]:
-    """(name, unit) of each of the columns of one of the `arrays_of`, which has so many."""
+def labels(kind: Kind, name: str, width: int, run: StateNames | None = None) -> list[tuple[str, str]]:
+    """(name, unit) of each of the columns of one of the `arrays_of`, which has so many; run: needed for "q" and "u"."""
     match kind:
-        case "q":
-            return list(run.q_names)
-        case "u":
-            return list(run.u_names)
+        case "q" | "u":
+            assert run is not None  # whose coordinates and speeds they are
+            return list(run.q_names if kind == "q" else run.u_names)
         case "position":
             return _vector(f"{name}.position", "m")
         case "quaternion":

@@ -21,7 +21,7 @@ from flexmb.scene.functions import Constant
 from flexmb.scene.schema import Scene, SceneEvent, Wheel
 from flexmb.scene.stops import leaves, leaving, resting, stop_sensor
 from flexmb.scene.tree import Coordinate, rate_name, scalar_paths
-from flexmb.scene.values import changed_at
+from flexmb.scene.values import changed_at, values_at
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.compile import assembled
 from flexmb.system.scene_arrays import kernels_of
@@ -174,7 +174,7 @@ class Situation:
             case Impact(coordinate=name, restitution=restitution):
                 self._strike(at, name, -restitution)
             case Release(coordinate=name):
-                item = _found(self.given, self._paths[name])
+                [item] = values_at(self.given, self._paths[name])
                 freed = replace(item, **{item.KEYS.prescribed: None})
                 self._become(changed_at(self.system.scene, self._paths[name], lambda _: freed), at)
             case Change(path=path, value=value):
@@ -249,13 +249,6 @@ class Situation:
 
 def _recorded(name: str, at: EventInstant, after: State) -> EventRecord:
     return EventRecord(name, at.t, at.impulses, float(at.y[-1]) - at.work, at.before, after, at.closures)
-
-
-def _found(scene: Scene, path: str) -> Coordinate | Wheel:
-    """The coordinate or wheel at a path of a scene."""
-    items: list[Coordinate | Wheel] = []
-    changed_at(scene, path, lambda item: items.append(item) or item)
-    return items[0]
 
 
 def with_stops(system: System) -> System:

@@ -14,6 +14,14 @@ from numpy.typing import ArrayLike, NDArray
 from flexmb.typing import Real
 
 
+def cross_matrix(a: Real) -> Real:
+    """Cross-product matrices (..., 3, 3) of vectors (..., 3): cross_matrix(a) b = a x b."""
+    x, y, z = a[..., 0], a[..., 1], a[..., 2]
+    zero = np.zeros_like(x)
+    rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
 def rotation_matrix(quaternion: ArrayLike) -> Real:
     """R (...,3,3) of quaternions (...,4), which are normalised; ValueError if one is zero."""
     given = np.asarray(quaternion, dtype=float)

@@ -18,6 +18,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from flexmb.scene.bodies import BeamBody, BeamStation, Matrix6
+from flexmb.scene.quaternions import cross_matrix
 from flexmb.scene.rounding import ROUNDING
 from flexmb.typing import Real
 
@@ -72,7 +73,7 @@ def inertia_on_axis(station: BeamStation) -> Real:
         m, moment = given[0, 0], np.array([[0.0, -given[0, 5], given[0, 4]]])
         stated = np.zeros((6, 6))
         stated[:3, :3] = m * np.eye(3)
-        stated[3:, :3] = _skew(moment)[0]
+        stated[3:, :3] = cross_matrix(moment)[0]
         stated[:3, 3:] = stated[3:, :3].T
         stated[3:, 3:] = given[3:, 3:]
     return _on_axis(stated, station.reference_point_m)
@@ -89,14 +90,14 @@ def mass_centres(inertia: Real) -> tuple[Real, Real, Real]:
     com = np.zeros((len(m), 3))
     np.divide(-inertia[:, 0, 5], m, out=com[:, 1], where=m != 0.0)
     np.divide(inertia[:, 0, 4], m, out=com[:, 2], where=m != 0.0)
-    about_axis, of_mass = inertia[:, 3:, 3:], -m[:, None, None] * _skew(com) @ _skew(com)
+    about_axis, of_mass = inertia[:, 3:, 3:], -m[:, None, None] * cross_matrix(com) @ cross_matrix(com)
     return m, com, _above_rounding(about_axis - of_mass, np.abs(about_axis) + np.abs(of_mass))
 
 
 def inertia_matrices(mass: Real, com: Real, inertia: Real) -> Real:
     """Inertias (n,6,6) of masses (n,), mass centres (n,3) and inertias (n,3,3) about these."""
-    c = mass[:, None, None] * _skew(com)
-    return np.block([[mass[:, None, None] * np.eye(3), -c], [c, inertia - c @ _skew(com)]])
+    c = mass[:, None, None] * cross_matrix(com)
+    return np.block([[mass[:, None, None] * np.eye(3), -c], [c, inertia - c @ cross_matrix(com)]])
 
 
 def restated(station: BeamStation, point: tuple[float, float]) -> BeamStation:
@@ -165,11 +166,6 @@ def _on_axis(stated: Real, point: tuple[float, float]) -> Real:
 def _above_rounding(found: Real, terms: Real) -> Real:
     """Sums, with zeros where nothing is left of terms of these sizes but rounding: what they cancel couples nothing."""
     return np.where(np.abs(found) > ROUNDING * terms, found, 0.0)
-
-
-def _skew(c: Real) -> Real:
-    """Matrices (n,3,3) of c x, c (n,3)."""
-    return np.swapaxes(np.cross(c[:, None], np.eye(3)), 1, 2)
 
 
 def _given(station: BeamStation, key: str) -> float:

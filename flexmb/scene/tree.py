@@ -1,4 +1,6 @@
-"""Reading a scene as a tree: bodies base to tip, rest frames of nodes, scalar coordinates of hinges by name."""
+"""Reading a scene as a tree: bodies base to tip, rest frames of nodes, scalar coordinates of hinges by name, and the
+ends of closures and of connectors between nodes.
+"""
 
 from __future__ import annotations
 
@@ -10,11 +12,11 @@ from msgspec.structs import replace
 
 from flexmb.scene import control as c
 from flexmb.scene.bodies import IDENTITY, ZERO, BeamBody, Body, ModalBody, Quaternion, RigidBody, SidBody, Vector
-from flexmb.scene.connectors import AlongHinge, AngularFriction
+from flexmb.scene.connectors import AlongHinge, AngularFriction, BetweenNodes
 from flexmb.scene.couplings import CoupledCoordinate, Coupling
 from flexmb.scene.events import Impact
 from flexmb.scene.freedoms import AngularCoordinate, Coordinate, LinearCoordinate
-from flexmb.scene.hinges import Hinge
+from flexmb.scene.hinges import Closure, Hinge
 from flexmb.scene.keys import struct_keys
 from flexmb.scene.quaternions import quaternion_of, rotation_matrix
 from flexmb.scene.rest_curve import is_curved, rest_sections
@@ -125,7 +127,7 @@ def _on_beam(body: BeamBody, x: float, quaternion: Quaternion) -> NodeFrame:
 
 def place_along(body: BeamBody, node: str) -> float:
     """Where a node of a beam is, in m along its axis from the root; ValueError if there is no such node."""
-    places = {"origin": 0.0, "root": 0.0, "tip": body.length_m} | {n.name: n.x_m for n in body.nodes}
+    places = nodes_along(body)
     if node not in places:
         raise ValueError(f'body "{body.name}" has no node "{node}"; its nodes are {", ".join(places)}')
     return places[node]
@@ -275,3 +277,26 @@ def watchable(scene: Scene) -> dict[str, str]:
             case _:
                 assert_never(sensor)
     return found
+
+
+class EndFrame(NamedTuple):
+    """A frame with fixed offsets from a node of a body, in node axes, or from World where `body` is the ground."""
+
+    body: str
+    node: str
+    position_m: Vector
+    quaternion: Quaternion
+
+
+def ends(item: Closure | BetweenNodes) -> tuple[EndFrame, EndFrame]:
+    """Frames A and B; where the item joins points only, the frames have the axes of their nodes."""
+    return _end(item, "a"), _end(item, "b")
+
+
+def _end(item: Closure | BetweenNodes, side: str) -> EndFrame:
+    return EndFrame(
+        getattr(item, f"body_{side}"),
+        getattr(item, f"node_{side}"),
+        getattr(item, f"position_{side}_m"),
+        getattr(item, f"quaternion_{side}", IDENTITY),
+    )

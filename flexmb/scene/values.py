@@ -42,6 +42,13 @@ def changed_at(scene: Any, path: str, change: Callable[[Any], Any]) -> Any:
     return _changed(scene, _in_full(scene, path), path, change)
 
 
+def values_at(scene: Any, path: str) -> list[Any]:
+    """What a scene has at a path, for a path with `*` at all its places; PathError where it has nothing."""
+    values: list[Any] = []
+    changed_at(scene, path, lambda value: values.append(value) or value)
+    return values
+
+
 def number_at(path: str, old: Any, new: float) -> float:
     """The number `new` with the type of `old`; PathError if `old` is not a number, or `new` not whole for a count."""
     if isinstance(old, bool) or not isinstance(old, int | float):

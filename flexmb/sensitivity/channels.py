@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from flexmb.control.wiring import wired
+from flexmb.run.run_arrays import Kind, labels
 from flexmb.run.trajectory import Trajectory
 from flexmb.scene.problems import closest
 from flexmb.scene.tree import watches_signals
@@ -30,6 +32,12 @@ class Seen(NamedTuple):
 
 Channel = Callable[[Seen], Real]
 """The derivatives (...,P) of one channel."""
+Named = tuple[str, Channel]
+_LOADS: tuple[tuple[Kind, str, str], ...] = (
+    ("loads", "loads", "hinges"), ("loads", "closures", "closures"), ("wheel_loads", "wheel_loads", "wheels"),
+    ("connectors", "connectors", "connectors"),
+)  # fmt: skip
+"""Kinds of channels by the part of a row and the names that they have there."""
 
 
 class Chosen(NamedTuple):
@@ -91,41 +99,37 @@ def channels(system: System, signals: dict[str, slice]) -> dict[str, Channel]:
     return dict(_all(system, signals))
 
 
-def _all(system: System, signals: dict[str, slice]) -> Iterator[tuple[str, Channel]]:
+def _all(system: System, signals: dict[str, slice]) -> Iterator[Named]:
     observation = system.observation
     names, columns = observation.names, observation.columns
     for i, (name, _) in enumerate((*system.state_names[0], *system.state_names[1])):
         yield name, _state(i)
     yield "work", _state(-1)
+    start = {name: place.start for name, (place, _) in columns.items()}
+
+    def each(kind: Kind, name: str, places: Sequence[int], channel: Callable[[int], Channel] = _row) -> Iterator[Named]:
+        found = zip(labels(kind, name, len(places)), places, strict=True)
+        return ((label, channel(place)) for (label, _), place in found)
+
     for i, name in enumerate(names.markers):
-        first = columns["markers"][0].start + 24 * i
-        yield from _each(f"{name}.position", "xyz", first)
-        for k, axis in enumerate("wxyz"):
-            yield f"{name}.quaternion.{axis}", _quaternion(first + 3, k)
-        for k, part in enumerate(("angular_velocity", "velocity", "angular_acceleration", "acceleration")):
-            yield from _each(f"{name}.{part}", "xyz", first + 12 + 3 * k)
-    for group, items in (
-        ("loads", names.hinges), ("closures", names.closures), ("wheel_loads", names.wheels),
-        ("connectors", names.connectors),
-    ):  # fmt: skip
-        for i, name in enumerate(items):
-            first = columns[group][0].start + 6 * i
-            yield from _each(f"{name}.torque", "xyz", first)
-            yield from _each(f"{name}.force", "xyz", first + 3)
+        first = start["markers"] + 24 * i
+        yield from each("position", name, range(first, first + 3))
+        yield from each("quaternion", name, range(4), partial(_quaternion, first + 3))
+        yield from each("velocity", name, range(first + 12, first + 18))
+        yield from each("acceleration", name, range(first + 18, first + 24))
+    for kind, group, items in _LOADS:
+        for i, name in enumerate(getattr(names, items)):
+            yield from each(kind, name, range(start[group] + 6 * i, start[group] + 6 * i + 6))
     for name, speeds in names.driven.items():
-        for i, speed in enumerate(speeds):
-            yield f"{name}.drive[{i}]", _row(columns["drives"][0].start + int(speed))
+        yield from each("drives", name, (start["drives"] + speeds).tolist())
     for i, name in enumerate(names.hinge_forces):
-        yield f"{name}.hinge_force", _row(columns["hinge_forces"][0].start + i)
-    energies = columns["energy"][0]
+        yield from each("hinge_forces", name, [start["hinge_forces"] + i])
     for i, name in enumerate(ENERGIES):
-        yield f"energy.{name}", _row(energies.start + i)
-    yield "energy.total", _sum(energies)
-    yield from _each("momentum.angular", "xyz", columns["momentum"][0].start)
-    yield from _each("momentum.linear", "xyz", columns["momentum"][0].start + 3)
+        yield from each("energy", name, [start["energy"] + i])
+    yield "energy.total", _sum(columns["energy"][0])
+    yield from each("momentum", "", range(start["momentum"], start["momentum"] + 6))
     for name, place in signals.items():
-        for i in range(place.stop - place.start):
-            yield f"signal.{name}[{i}]", _signal(place.start + i)
+        yield from each("signals", name, range(place.start, place.stop), _signal)
 
 
 def value(system: System, channel: Channel, name: str, itself: Seen) -> float:
@@ -141,11 +145,6 @@ def value(system: System, channel: Channel, name: str, itself: Seen) -> float:
     first = observation.columns["markers"][0].start + 24 * list(observation.names.markers).index(marker) + 3
     R = itself.observed.row[first : first + 9].reshape(3, 3)
     return float(Rotation.from_matrix(R).as_quat(canonical=True, scalar_first=True)["wxyz".index(axis)])
-
-
-def _each(name: str, axes: str, first: int) -> Iterator[tuple[str, Channel]]:
-    for i, axis in enumerate(axes):
-        yield f"{name}.{axis}", _row(first + i)
 
 
 def _state(i: int) -> Channel:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexmb.kept import kept
-from flexmb.modal.cross import cross_matrix
 from flexmb.scene.problems import closest
+from flexmb.scene.quaternions import cross_matrix
 from flexmb.system.frames import AT_GROUND, body_pose, link_pose
 from flexmb.system.scene_arrays import SceneArrays
 from flexmb.tables import arguments

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.modal.cross import cross_matrix
 from flexmb.modal.strain_field import LINEAR, SQUARE, STRETCH, WHOLE, StrainField
+from flexmb.scene.quaternions import cross_matrix
 from flexmb.typing import Real
 
 TERMS = 20  # of the series of A and B in phi^2: all digits up to half a turn

@@ -19,12 +19,11 @@ from crosscheck.engines.exudyn.motion import AT_REST, FrameMotion, across_quater
 from crosscheck.engines.exudyn.sections import BeamElement, BeamSection, SpatialBeam, spatial_beam
 from crosscheck.engines.functions_of_time import Profile, profile
 from flexmb.scene.connectors import BetweenNodes
-from flexmb.scene.ends import ends
 from flexmb.scene.freedoms import Ball, Floating, ScalarFreedom
 from flexmb.scene.hinges import Free, Hinge
 from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.schema import BeamBody, Body, Closure, Load, ModalBody, PointMass, Scene, Wheel
-from flexmb.scene.tree import GROUND, node_frame, ordered
+from flexmb.scene.tree import GROUND, ends, node_frame, ordered
 from flexmb.surrogate.lumping import Inertia, inertia_of, rigid_equivalent
 from flexmb.typing import Real
 

@@ -20,8 +20,7 @@ from crosscheck.engines.exudyn.modal import NodeShape
 from crosscheck.engines.exudyn.rotations import exponential, left_jacobian, left_jacobian_rate, quaternions
 from crosscheck.engines.exudyn.state import CarrierPath, States
 from flexmb.scene.connectors import BetweenNodes
-from flexmb.scene.ends import EndFrame, ends
-from flexmb.scene.tree import GROUND
+from flexmb.scene.tree import GROUND, EndFrame, ends
 from flexmb.typing import Real
 
 

@@ -8,11 +8,10 @@ from typing import assert_never
 from crosscheck.engines.contract import Support
 from crosscheck.engines.exudyn.assembly import deforming, flexible
 from crosscheck.engines.links import first_armature, first_screw
-from flexmb.scene.ends import ends
 from flexmb.scene.hinges import Free
 from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.schema import BeamBody, Body, ModalBody, RigidBody, Scene, SidBody
-from flexmb.scene.tree import GROUND
+from flexmb.scene.tree import GROUND, ends
 
 NOT_WORKLESS = (
     "it hangs on a deforming node: Exudyn's marker averages mesh points there, and its joint is not workless "

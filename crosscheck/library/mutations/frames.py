@@ -20,9 +20,9 @@ from crosscheck.library.mutations.edits import (
 from crosscheck.library.mutations.mutation import LESS, Mutation
 from flexmb.scene.bodies import BeamNode, Quaternion
 from flexmb.scene.connectors import BetweenNodes
-from flexmb.scene.ends import ends
 from flexmb.scene.hinges import Closure, Hinge
 from flexmb.scene.schema import Load, Marker, PointMass, Scene, Wheel
+from flexmb.scene.tree import ends
 
 Mounted = Wheel | PointMass | Load | Marker
 EPS = 1e-15

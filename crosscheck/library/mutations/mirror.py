@@ -10,10 +10,10 @@ from __future__ import annotations
 from typing import assert_never
 
 from flexmb.scene.bodies import BeamBody, Body, Matrix3, ModalBody, Quaternion, RigidBody, SidBody, Vector
-from flexmb.scene.ends import ends
 from flexmb.scene.freedoms import Ball, Floating, Freedom, ScalarFreedom
 from flexmb.scene.hinges import Closure, Hinge
 from flexmb.scene.schema import Load, Scene, Wheel
+from flexmb.scene.tree import ends
 
 X, Y, Z = AXES = (0, 1, 2)
 EPS = 1e-12

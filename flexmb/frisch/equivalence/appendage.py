@@ -14,12 +14,12 @@ from flexmb.frisch.normalisation import combined, normalised
 from flexmb.frisch.parameters import ModeParameters, mode_parameters
 from flexmb.kept import kept
 from flexmb.modal.beam import beam_elements
-from flexmb.modal.cross import cross_matrix
 from flexmb.modal.flexible import flexible_model
 from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.scene.bodies import BeamBody, Level, ModalBody, RigidBody, SidBody
 from flexmb.scene.connectors import BetweenNodes
 from flexmb.scene.problems import closest
+from flexmb.scene.quaternions import cross_matrix
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 

@@ -6,8 +6,7 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from flexmb.frisch.equivalence.comparison import BEST, Equivalence, percent
-from flexmb.frisch.equivalence.mode_count import Direction
+from flexmb.frisch.equivalence.comparison import BEST, Direction, Equivalence, percent
 from flexmb.frisch.equivalence.relations import HingeFit, Relation, displacement_relations, modal_effective_inertia
 from flexmb.output.listing import Listing, figures, names, prose
 from flexmb.typing import Real

@@ -31,7 +31,7 @@ from scipy.spatial.transform import Rotation
 from flexmb.frisch.elements import inertia_of
 from flexmb.frisch.equivalence.appendage import Appendage
 from flexmb.frisch.parameters import ModeParameters
-from flexmb.modal.cross import cross_matrix
+from flexmb.scene.quaternions import cross_matrix
 from flexmb.typing import Real
 
 _ROUND_OFF = 1e-12  # moments of inertia below this fraction of their scale are taken for rounding errors of zero

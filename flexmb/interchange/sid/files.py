@@ -22,9 +22,9 @@ import numpy as np
 
 from flexmb.interchange.imported import MAGNITUDE, usable
 from flexmb.interchange.sid.blocks import Sid, SidError, SidNode, Taylor, node_shapes, shapes
-from flexmb.modal.cross import cross_matrix
 from flexmb.modal.first_order import symmetric
 from flexmb.output.files import write_whole
+from flexmb.scene.quaternions import cross_matrix
 from flexmb.scene.reading import MIB, Unreadable, read_text
 from flexmb.typing import Index, Real
 

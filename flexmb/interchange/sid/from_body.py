@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from flexmb.interchange.sid.blocks import Sid, SidNode, Taylor
-from flexmb.modal.cross import cross_matrix
 from flexmb.modal.first_order import FirstOrder, first_order, steiner, symmetric
 from flexmb.modal.flexible import flexible_model
 from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode, SecondOrder
 from flexmb.scene.bodies import BeamBody, ModalBody
+from flexmb.scene.quaternions import cross_matrix
 from flexmb.typing import Real
 
 ROWS, COLUMNS = (0, 1, 2, 0, 1, 2), (0, 1, 2, 1, 2, 0)

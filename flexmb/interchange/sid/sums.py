@@ -13,8 +13,8 @@ import numpy as np
 
 from flexmb.interchange.sid.blocks import Sid, SidError, Taylor
 from flexmb.interchange.sid.from_body import COLUMNS, ROWS
-from flexmb.modal.cross import cross_matrix
 from flexmb.modal.first_order import steiner, symmetric
+from flexmb.scene.quaternions import cross_matrix
 from flexmb.scene.rounding import ROUNDING
 from flexmb.typing import Real
 

@@ -26,13 +26,12 @@ from flexmb.interchange.point_masses import (
 from flexmb.interchange.sid.blocks import Sid, SidError, SidNode, Taylor
 from flexmb.interchange.sid.files import read_sid
 from flexmb.interchange.sid.sums import PRINTED, Scale, Sums, axial, largest, planar, second_moment
-from flexmb.modal.cross import cross_matrix
 from flexmb.modal.first_order import symmetric
 from flexmb.scene.bodies import Level, ModalBody, SidBody
 from flexmb.scene.convert import plain, to_struct
 from flexmb.scene.modal_data import inertia_points
 from flexmb.scene.problems import SceneError, SceneWarning
-from flexmb.scene.quaternions import quaternion_of
+from flexmb.scene.quaternions import cross_matrix, quaternion_of
 from flexmb.scene.rounding import ROUNDING
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real

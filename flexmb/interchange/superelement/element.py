@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from flexmb.modal.cross import cross_matrix
+from flexmb.scene.quaternions import cross_matrix
 from flexmb.typing import Real
 
 RIGID = 1e-6

@@ -17,7 +17,14 @@ import numpy as np
 
 from flexmb.interchange.imported import MAGNITUDE, usable
 from flexmb.interchange.superelement.element import SuperElement, SuperElementError, super_element
-from flexmb.interchange.superelement.matrix_market import both_halves, market_matrix, refuse_large
+from flexmb.interchange.superelement.matrices import (
+    both_halves,
+    dof_rows,
+    mapping_rows,
+    market_matrix,
+    refuse_large,
+    triplets,
+)
 from flexmb.interchange.superelement.nastran import (
     NamedMatrix,
     Nodes,
@@ -30,7 +37,6 @@ from flexmb.interchange.superelement.nastran import (
     number_of_node,
     op4_matrices,
 )
-from flexmb.interchange.superelement.triplets import dof_rows, mapping_rows, triplets
 from flexmb.scene.reading import MIB, Unreadable, read_bytes, read_text, regular_size
 from flexmb.typing import Real
 

@@ -18,10 +18,10 @@ from flexmb.interchange.imported import listed
 from flexmb.interchange.point_masses import FARTHEST, NoMasses, RigidBlock, points_with
 from flexmb.interchange.superelement.element import ALIKE, DUST, MOTIONS, SuperElement, SuperElementError
 from flexmb.interchange.superelement.interface import Interface, interface_of
-from flexmb.modal.cross import cross_matrix
 from flexmb.scene.bodies import Level, ModalBody
 from flexmb.scene.convert import plain, to_struct
 from flexmb.scene.modal_data import inertia_points
+from flexmb.scene.quaternions import cross_matrix
 from flexmb.typing import Real
 
 

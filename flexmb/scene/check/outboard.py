@@ -22,10 +22,10 @@ from flexmb.scene.freedoms import Ball, Coordinate, Floating, Freedom, ScalarFre
 from flexmb.scene.hinges import Hinge
 from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.problems import Defect
-from flexmb.scene.quaternions import rotation_by, rotation_matrix
+from flexmb.scene.quaternions import cross_matrix, rotation_by, rotation_matrix
 from flexmb.scene.rounding import ROUNDING
 from flexmb.scene.schema import PointMass, Scene, Wheel
-from flexmb.scene.sections import inertia_on_axis, mass_centres
+from flexmb.scene.sections import inertia_matrices, inertia_on_axis, mass_centres
 from flexmb.scene.tree import GROUND, NodeFrame, ordered, rest_frames
 from flexmb.typing import Real
 
@@ -36,6 +36,7 @@ LOCKED = (
     "the hinge starts where its axes align (gimbal lock): one of its freedoms is lost",
     "start elsewhere, choose another sequence, or use a spherical hinge",
 )
+ANGULAR_FIRST = [3, 4, 5, 0, 1, 2]
 GAUSS = np.polynomial.legendre.leggauss(2)  # exact for a linear section times x^2
 
 
@@ -222,13 +223,7 @@ def _beam(body: BeamBody) -> Real:
 
 def _lumps(mass: Real, com: Real, inertia: Real) -> Real:
     """Spatial inertias (n,6,6), angular first, of lumps with mass centres `com` (n,3) and `inertia` about them."""
-    c, m = _skew(com), mass[:, None, None]
-    out = np.empty((len(mass), 6, 6))
-    out[:, :3, :3] = inertia - m * c @ c
-    out[:, :3, 3:] = m * c
-    out[:, 3:, :3] = -m * c
-    out[:, 3:, 3:] = m * np.eye(3)
-    return out
+    return inertia_matrices(mass, com, inertia)[:, ANGULAR_FIRST][:, :, ANGULAR_FIRST]
 
 
 def _lump(mass: float, com: Vector | Real, inertia: ArrayLike) -> Real:
@@ -241,15 +236,7 @@ def _motions(R: Real, p: Real) -> Real:
     """X (n,6,6): spatial velocity [w; v] of the body frame to that of the frame at R, p in it, in that frame's axes."""
     out = np.zeros((len(R), 6, 6))
     out[:, :3, :3] = out[:, 3:, 3:] = turn = np.swapaxes(R, 1, 2)
-    out[:, 3:, :3] = -turn @ _skew(p)
-    return out
-
-
-def _skew(v: Real) -> Real:
-    """(n,3,3) matrices of v x, v (n,3)."""
-    out = np.zeros((len(v), 3, 3))
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        out[:, k, j], out[:, j, k] = v[:, i], -v[:, i]
+    out[:, 3:, :3] = -turn @ cross_matrix(p)
     return out
 
 

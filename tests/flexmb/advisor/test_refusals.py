@@ -8,12 +8,11 @@ from msgspec.structs import replace
 
 import flexmb as fm
 from flexmb.advisor import advice as advice_module
-from flexmb.advisor.advice import advise, prepare
+from flexmb.advisor.advice import advise, prepare, remedies
 from flexmb.advisor.confirm import Confirmation, NoReference, hopeless
 from flexmb.advisor.ladder import highest_frequency
 from flexmb.advisor.models import EXACT, BodyModel, built
 from flexmb.advisor.quantity import quantities
-from flexmb.advisor.remedies import remedies
 from tests.benchmarks.advice_questions import questions
 from tests.flexmb.advisor.scenes import turned
 

@@ -6,7 +6,7 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from flexmb.building import assemble, carried
+from flexmb.building import assemble
 from flexmb.dense import DenseSystem
 from flexmb.entry import articulated
 from flexmb.hinges import catalogue
@@ -122,7 +122,7 @@ DRILL = scalar_hinge("drill", 1, pose=pose, motion=motion, reduced=reduced)
 def with_drill(monkeypatch):
     """A catalogue of one more kind; the dense route and all else follow from its freedoms."""
     kinds = (*catalogue.KINDS, DRILL)
-    for room in (catalogue, assemble, carried):
+    for room in (catalogue, assemble):
         monkeypatch.setattr(room, "KINDS", kinds)
     for name in ("pose", "motion", "rate", "retract", "resolve"):
         monkeypatch.setattr(catalogue, name, numbered(name, HINGE, [getattr(kind, name) for kind in kinds]))

@@ -10,8 +10,7 @@ from scipy.linalg import eigh
 from scipy.spatial.transform import Rotation
 
 from flexmb.frisch.equivalence.appendage import Appendage, appendage, appendage_of
-from flexmb.frisch.equivalence.comparison import AT_CLAMP, BEST, GIVEN, coupling_error, equivalence
-from flexmb.frisch.equivalence.mode_count import directions
+from flexmb.frisch.equivalence.comparison import AT_CLAMP, BEST, GIVEN, coupling_error, directions, equivalence
 from flexmb.frisch.equivalence.relations import (
     acceleration_relations,
     best_hinge,

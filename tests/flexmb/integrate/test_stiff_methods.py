@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import _ivp, solve_ivp
 
-from flexmb.integrate import radau5_tableau as tableau
+from flexmb.integrate import radau5_stages as tableau
 from flexmb.integrate.exponential import exponential
 from flexmb.integrate.generalised_alpha import generalised_alpha
 from flexmb.integrate.radau5 import radau5

@@ -14,13 +14,13 @@ import flexmb
 from flexmb.dense.body_frames import section_frames
 from flexmb.dense.jets import Jet
 from flexmb.modal.beam import beam_elements
-from flexmb.modal.cross import cross_matrix
 from flexmb.modal.exact import exact_model
 from flexmb.modal.second_order import beam_second_order
 from flexmb.modal.strain_field import LINEAR, SQUARE, WHOLE
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.modal_data import inertia_points
+from flexmb.scene.quaternions import cross_matrix
 from flexmb.system.moved_sections import MovedSections, moved_sections
 from flexmb.typing import Real
 from tests.bounds import observed_order, relative

@@ -10,7 +10,6 @@ import pytest
 
 import flexmb
 from flexmb.interchange.sid import sid_of
-from flexmb.modal.cross import cross_matrix
 from flexmb.modal.exact import exact_model
 from flexmb.modal.strain_field import WHOLE
 from flexmb.parameters.parameters import ParameterError
@@ -18,6 +17,7 @@ from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.check import SceneError
 from flexmb.scene.modal_data import inertia_points
+from flexmb.scene.quaternions import cross_matrix
 from flexmb.scene.rest_curve import rest_sections
 from flexmb.scene.values import changed_at
 from flexmb.system.frames import node_pose

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flexmb.modal.cross import cross_matrix
 from flexmb.modal.first_order import FirstOrder, first_order, inertia_slope
 from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.modal.integrals import modal_integrals
+from flexmb.scene.quaternions import cross_matrix
 from tests.bounds import gamma
 from tests.flexmb.modal.test_modal_points import random_model
 

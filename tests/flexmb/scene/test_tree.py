@@ -4,8 +4,7 @@ connectors."""
 import pytest
 
 from flexmb.scene import schema as s
-from flexmb.scene.ends import EndFrame, ends
-from flexmb.scene.tree import coordinates, node_frame, node_names, ordered, rest_frames
+from flexmb.scene.tree import EndFrame, coordinates, ends, node_frame, node_names, ordered, rest_frames
 
 UNIT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
