@@ -45,7 +45,12 @@ def changed_at(scene: Any, path: str, change: Callable[[Any], Any]) -> Any:
 def values_at(scene: Any, path: str) -> list[Any]:
     """What a scene has at a path, for a path with `*` at all its places; PathError where it has nothing."""
     values: list[Any] = []
-    changed_at(scene, path, lambda value: values.append(value) or value)
+
+    def read(value: Any) -> Any:
+        values.append(value)
+        return value
+
+    changed_at(scene, path, read)
     return values
 
 
