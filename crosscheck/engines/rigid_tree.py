@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Generic, NamedTuple, TypeVar, assert_never
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from crosscheck.engines.connections import Along, Exerted, Moving, along_hinges, connections
-from crosscheck.engines.conventions import Frame, rotation_vector
+from crosscheck.engines.connections import WORLD, Along, Exerted, Moving, along_hinges, connections
+from crosscheck.engines.contract import MarkerSnapshot, Snapshot
+from crosscheck.engines.conventions import (
+    Frame,
+    cross,
+    quaternion_of,
+    quaternion_rate,
+    rotated,
+    rotation_vector,
+    scalar_first,
+    scalar_last,
+    shift_wrench,
+)
 from crosscheck.engines.functions_of_time import Profile, Signals, profile
 from crosscheck.engines.links import Attachment, Ball, Floating, Freedom, Link, Scalar, attachment
 from flexmb.scene.schema import Load, Scene
@@ -44,9 +55,24 @@ def places(numbers: ArrayLike) -> Places:
     return slice(int(indices[0]), int(indices[-1]) + 1) if np.all(np.diff(indices) == 1) else indices
 
 
-def as_it_is(quaternion: Real) -> Real:
-    """A quaternion of a peer that counts them as the scene does, scalar first."""
-    return quaternion
+class Counting(NamedTuple):
+    """How a peer counts ball joints and free flight: quaternions with the scalar first or last, of the speeds of free
+    flight the linear or the angular ones first, the linear ones in outboard or in inboard axes."""
+
+    scalar_first: bool = True
+    linear_first: bool = False
+    outboard: bool = True
+
+    def of_scene(self, quaternion: ArrayLike) -> Real:
+        """The quaternion of the scene as the peer has it."""
+        return np.asarray(quaternion, dtype=float) if self.scalar_first else scalar_last(quaternion)
+
+    def of_peer(self, quaternion: Real) -> Real:
+        """The quaternion of the peer, scalar first."""
+        return quaternion if self.scalar_first else scalar_first(quaternion)
+
+
+AS_THE_SCENE = Counting()
 
 
 def scalars(slots: Sequence[AnySlot]) -> list[AnySlot]:
@@ -67,25 +93,23 @@ def scalar_start(freedom: Scalar) -> tuple[float, float]:
     return profile(freedom.prescribed)(0.0)[:2]
 
 
-def scene_start(
-    slots: Sequence[Slot], sizes: tuple[int, int], flight: Callable[[Floating], ArrayLike],
-    quaternion: Callable[[Real], Real] = as_it_is,
-) -> tuple[Real, Real]:  # fmt: skip
-    """q and v, of these sizes, at t = 0; free flight has position and quaternion in q.
-
-    `flight` gives its speeds (6,), `quaternion` the order in which the peer has the scene's quaternions.
-    """
+def scene_start(slots: Sequence[Slot], sizes: tuple[int, int], counting: Counting) -> tuple[Real, Real]:
+    """q and v, of these sizes, at t = 0; free flight has position and quaternion in q."""
     q, v = (np.zeros(size) for size in sizes)
     for slot in slots:
         match slot.freedom:
             case Scalar() as freedom:
                 q[slot.q], v[slot.v] = scalar_start(freedom)
             case Ball() as freedom:
-                q[slot.q : slot.q + 4] = quaternion(np.array(freedom.quaternion))
+                q[slot.q : slot.q + 4] = counting.of_scene(freedom.quaternion)
                 v[slot.v : slot.v + 3] = freedom.angular_velocity
             case Floating() as freedom:
-                q[slot.q : slot.q + 7] = [*freedom.position, *quaternion(np.array(freedom.quaternion))]
-                v[slot.v : slot.v + 6] = flight(freedom)
+                q[slot.q : slot.q + 7] = [*freedom.position, *counting.of_scene(freedom.quaternion)]
+                linear = freedom.velocity if counting.outboard else rotated(freedom.quaternion, freedom.velocity)
+                halves = (linear, freedom.angular_velocity) if counting.linear_first else (
+                    freedom.angular_velocity, linear
+                )  # fmt: skip
+                v[slot.v : slot.v + 6] = np.concatenate(halves)
             case _:
                 assert_never(slot.freedom)
     return q, v
@@ -113,11 +137,14 @@ class TreeState(NamedTuple):
 
 
 class Turning(NamedTuple):
-    """A ball joint or free flight: where q has its quaternion, and y the one that is integrated."""
+    """A ball joint or free flight: where q has its quaternion and y the one that is integrated, and v its angular and
+    its linear speeds, None at a ball."""
 
     slot: Slot
     in_q: slice
     in_y: slice
+    angular: slice
+    linear: slice | None
 
 
 class FreeCoordinates(Generic[AnySlot]):
@@ -127,8 +154,8 @@ class FreeCoordinates(Generic[AnySlot]):
     everything else uses the normalised q. Driven coordinates follow their functions of time.
     """
 
-    def __init__(self, slots: Sequence[AnySlot], nq: int, nv: int) -> None:
-        self._nq, self._nv = nq, nv
+    def __init__(self, slots: Sequence[AnySlot], nq: int, nv: int, counting: Counting = AS_THE_SCENE) -> None:
+        self._nq, self._nv, self._counting, self._slots = nq, nv, counting, slots
         self.driven = [slot for slot in slots if slot.driven]
         self._motions = [profile(slot.freedom.prescribed) for slot in self.driven if isinstance(slot.freedom, Scalar)]
         driven_q, self._driven_v = [slot.q for slot in self.driven], [slot.v for slot in self.driven]
@@ -139,12 +166,19 @@ class FreeCoordinates(Generic[AnySlot]):
         self.scalar_q, self.scalar_v = places([slot.q for slot in single]), places([slot.v for slot in single])
         turning = [(slot, quaternion_place(slot)) for slot in slots if not isinstance(slot.freedom, Scalar)]
         firsts = [int(np.searchsorted(free, place.start)) for _, place in turning]
-        self.turning = [Turning(slot, place, slice(k, k + 4)) for (slot, place), k in zip(turning, firsts, strict=True)]
+        self.turning = [
+            Turning(slot, place, slice(k, k + 4), *_speeds(slot, counting))
+            for (slot, place), k in zip(turning, firsts, strict=True)
+        ]
         self._none = np.zeros(0)
         self.plain = not self.driven and not turning
 
+    def initial(self) -> Real:
+        """y at t = 0."""
+        return self.packed(*scene_start(self._slots, (self._nq, self._nv), self._counting))
+
     def packed(self, q: Real, v: Real) -> Real:
-        """y of a state, before any work was done."""
+        """y of a state of all coordinates, before any work was done."""
         return np.concatenate([q[self._free_q], v[self.free_v], [0.0]])
 
     def state(self, t: float, y: Real) -> TreeState:
@@ -156,27 +190,74 @@ class FreeCoordinates(Generic[AnySlot]):
         if self._motions:
             motion = np.array([motion(t) for motion in self._motions])
             q[self._driven_q], v[self.driven_v], driven = motion[:, 0], motion[:, 1], motion[:, 2]
-        for _, place, _ in self.turning:
-            quaternion = q[place]
+        for each in self.turning:
+            quaternion = q[each.in_q]
             quaternion /= np.sqrt(quaternion @ quaternion)
         return TreeState(q, v, driven)
 
-    def rate(self, qdot: Real, vdot: Real, power: float) -> Real:
-        """dy/dt of rates (nq,) and (nv,) of all coordinates and speeds."""
+    def rate(self, y: Real, state: TreeState, vdot: Real, power: float) -> Real:
+        """dy/dt from the rates (nv,) of all speeds; those of quaternions depend on their values as integrated."""
+        if self.plain:
+            return np.concatenate([state.v, vdot, [power]])
+        qdot, counting = np.empty(self._nq), self._counting
+        qdot[self.scalar_q] = state.v[self.scalar_v]
+        for slot, in_q, in_y, angular, linear in self.turning:
+            own = counting.of_peer(y[in_y]).tolist()
+            qdot[in_q] = counting.of_scene(quaternion_rate(own, state.v[angular].tolist()))
+            if linear is not None:
+                moving = state.v[linear]
+                turned = rotated(counting.of_peer(state.q[in_q]), moving) if counting.outboard else moving
+                qdot[slot.q : slot.q + 3] = turned
         return np.concatenate([qdot[self._free_q], vdot[self.free_v], [power]])
 
 
+def _speeds(slot: Slot, counting: Counting) -> tuple[slice, slice | None]:
+    """Where v has the angular and the linear speeds."""
+    first, second = slice(slot.v, slot.v + 3), slice(slot.v + 3, slot.v + 6)
+    if isinstance(slot.freedom, Ball):
+        return first, None
+    return (second, first) if counting.linear_first else (first, second)
+
+
+class TreeEquations(Generic[AnySlot]):
+    """Base of the equations of motion of peers that SciPy or the loop of events steps; `motion` is the peer's own."""
+
+    coordinates: FreeCoordinates[AnySlot]
+
+    @property
+    def driven(self) -> list[AnySlot]:
+        return self.coordinates.driven
+
+    def motion(self, t: float, state: TreeState) -> tuple[Real, float]:
+        """Rates (nv,) of the speeds that `FreeCoordinates` integrates, and the power (W) of all but springs and
+        gravity."""
+        raise NotImplementedError
+
+    def initial(self) -> Real:
+        return self.coordinates.initial()
+
+    def packed(self, q: Real, v: Real) -> Real:
+        return self.coordinates.packed(q, v)
+
+    def state(self, t: float, y: Real) -> TreeState:
+        return self.coordinates.state(t, y)
+
+    def rate(self, t: float, y: Real) -> Real:
+        """dy/dt."""
+        state = self.state(t, y)
+        return self.coordinates.rate(y, state, *self.motion(t, state))
+
+
 class JointForces:
-    """Generalised forces (nv,) of springs, of dampers and of motors; `quaternion` makes a peer's scalar first."""
+    """Generalised forces (nv,) of springs, of dampers and of motors."""
 
     def __init__(
-        self, slots: Sequence[Slot], nv: int, quaternion: Callable[[Real], Real] = as_it_is,
-        signals: Signals | None = None,
-    ) -> None:  # fmt: skip
+        self, slots: Sequence[Slot], nv: int, counting: Counting = AS_THE_SCENE, signals: Signals | None = None
+    ) -> None:
         single = scalars(slots)
         sprung = [slot for slot in single if slot.freedom.stiffness]
         damped = [slot for slot in single if slot.freedom.damping]
-        self._nv, self._quaternion = nv, quaternion
+        self._nv, self._counting = nv, counting
         self._spring_q, self._spring_v = places([slot.q for slot in sprung]), places([slot.v for slot in sprung])
         self._stiffness = np.array([slot.freedom.stiffness for slot in sprung])
         self._rest = np.array([slot.freedom.rest for slot in sprung])
@@ -215,7 +296,7 @@ class JointForces:
         return float(energy)
 
     def _turn(self, slot: Slot, q: Real) -> Real:
-        return rotation_vector(self._quaternion(q[quaternion_place(slot)]))
+        return rotation_vector(self._counting.of_peer(q[quaternion_place(slot)]))
 
 
 @dataclass(frozen=True)
@@ -265,14 +346,6 @@ def placed_couplings(scene: Scene, slots: Sequence[Slot]) -> tuple[PlacedCouplin
     return tuple(placed)
 
 
-def placed_loads(
-    scene: Scene, links: tuple[Link, ...], signals: Signals | None = None
-) -> list[tuple[int, PointLoad]]:
-    """The loads at nodes, each with the number of its link, in whose axes they are."""
-    at = [attachment(scene, links, load) for load in scene.loads]
-    return [(there.link, PointLoad(load, there.frame, signals)) for there, load in zip(at, scene.loads, strict=True)]
-
-
 class PointLoad:
     """A force or torque at a `point` (3,) of a body; `at` is the load's frame in the axes that the engine uses."""
 
@@ -291,36 +364,60 @@ class PointLoad:
         """The load (3,) in World axes, for the body's rotation R (3, 3)."""
         return self._size(t).value * (self._direction if self.fixed_in_world else R @ self._direction)
 
-    def in_body(self, t: float, R: Real) -> Real:
-        """The load (3,) in the axes of the body."""
-        return self._size(t).value * (R.T @ self._direction if self.fixed_in_world else self._direction)
+
+LinkMotion = Callable[[int], Moving]
+"""How the frame of a link, by its number, moves at a state."""
 
 
-class TreeConnectors:
-    """The connectors of a scene on a tree of links: `between` nodes, and along scalar coordinates."""
+class TreeLoads:
+    """What acts on a tree of links from outside its joints: loads at nodes, and connectors between nodes and along
+    scalar coordinates."""
 
-    def __init__(self, scene: Scene, links: tuple[Link, ...], slots: Sequence[Slot]) -> None:
-        self.between = connections(scene, links)
-        self.along_hinges = []
-        for name, item, number, load in along_hinges(scene):
+    def __init__(
+        self, scene: Scene, links: tuple[Link, ...], slots: Sequence[Slot], signals: Signals | None = None
+    ) -> None:
+        places = [attachment(scene, links, load) for load in scene.loads]
+        self.at_nodes = [
+            (at.link, PointLoad(load, at.frame, signals)) for at, load in zip(places, scene.loads, strict=True)
+        ]
+        self.between, self.along_hinges = connections(scene, links), []
+        for name, item, number, along in along_hinges(scene):
             own = [slot for slot in scalars(slots) if slot.link.joint == item]
-            self.along_hinges.append((name, own[number], load))
+            self.along_hinges.append((name, own[number], along))
 
-    def __bool__(self) -> bool:
-        return bool(self.between or self.along_hinges)
+    @property
+    def on_links(self) -> bool:
+        """Whether anything acts on links."""
+        return bool(self.at_nodes or self.between)
 
-    def exerted(self, t: float, frame: Callable[[Attachment], Moving]) -> dict[str, Exerted]:
-        """What each connector between nodes does; `frame` gives the motion of a frame on a link."""
+    def exerted(self, t: float, motion: LinkMotion) -> dict[str, Exerted]:
+        """What each connector between nodes does."""
+
+        def frame(at: Attachment) -> Moving:
+            return (WORLD if at.link < 0 else motion(at.link)).carrying(at.frame)
+
         return {
             connector.name: connector.exerted(t, frame(connector.a), frame(connector.b)) for connector in self.between
         }
 
-    def loads(self, exerted: dict[str, Exerted]) -> Iterable[tuple[Attachment, Real]]:
-        """The frames on links on which they act, with [torque; force] (6,) about the frame in World axes."""
+    def wrenches(self, t: float, motion: LinkMotion) -> tuple[dict[int, Real], float]:
+        """[torque; force] (6,) on links about the origins of their frames, World axes, and the power (W)."""
+        total, power, none = dict[int, Real](), 0.0, np.zeros(3)
+        for link, load in self.at_nodes:
+            at = motion(link)
+            given = load.in_world(t, at.rotation)
+            wrench = np.concatenate([cross(at.rotation @ load.point, given), given] if load.is_force else [given, none])
+            total[link] = total[link] + wrench if link in total else wrench
+            power += float(wrench[:3] @ at.angular + wrench[3:] @ at.linear)
+        exerted = self.exerted(t, motion)
         for connector in self.between:
-            for at, load in ((connector.a, exerted[connector.name].on_a), (connector.b, exerted[connector.name].on_b)):
-                if at.link >= 0:
-                    yield at, load
+            both = exerted[connector.name]
+            power += both.power
+            for end, own in ((connector.a, both.on_a), (connector.b, both.on_b)):
+                if end.link >= 0:
+                    wrench = shift_wrench(own, motion(end.link).rotation @ end.frame.position)
+                    total[end.link] = total[end.link] + wrench if end.link in total else wrench
+        return total, power
 
     def along(self, t: float, q: Real, v: Real) -> dict[str, tuple[int, Along]]:
         """For each connector along a hinge the speed that it acts on, and what it does."""
@@ -335,23 +432,81 @@ def by_joint(slots: Iterable[Slot], loads: Iterable[float]) -> dict[str, Real]:
     return {name: np.array(values) for name, values in named.items()}
 
 
-def of_kind(kind: str, wrenches: dict[tuple[str, str], Real]) -> dict[str, Real]:
-    """The wrenches of one kind of link, "body", "wheel" or "point mass", by the name of their joint."""
-    return {name: wrench for (kind_of_wrench, name), wrench in wrenches.items() if kind_of_wrench == kind}
+class BodyMotion(NamedTuple):
+    """A frame in World axes: position (3,), rotation (3,3), and velocities and accelerations (3,) of both."""
+
+    position: Real
+    rotation: Real
+    angular: Real
+    linear: Real
+    alpha: Real
+    acceleration: Real
+
+    def carrying(self, inner: Frame) -> BodyMotion:
+        """The motion of a frame fixed in this one."""
+        arm, w = self.rotation @ inner.position, self.angular
+        turning = cross(w, arm)
+        return BodyMotion(
+            self.position + arm, self.rotation @ inner.rotation, w, self.linear + turning, self.alpha,
+            self.acceleration + cross(self.alpha, arm) + cross(w, turning),
+        )  # fmt: skip
+
+    @property
+    def marker(self) -> MarkerSnapshot:
+        return MarkerSnapshot(
+            position=self.position,
+            quaternion=quaternion_of(self.rotation),
+            velocity=np.concatenate([self.angular, self.linear]),
+            acceleration=np.concatenate([self.alpha, self.acceleration]),
+        )
 
 
-class ConnectorOutputs(NamedTuple):
-    """Energy of all connectors (J), loads [torque; force] of those between nodes on B, and loads along hinges."""
-
-    energy: float
-    between: dict[str, Real]
-    along: dict[str, Real]
+STILL = BodyMotion(WORLD.position, WORLD.rotation, *(np.zeros(3) for _ in range(4)))
 
 
-def connector_outputs(exerted: dict[str, Exerted], along: dict[str, tuple[int, Along]]) -> ConnectorOutputs:
-    """What a snapshot says of connectors."""
-    stored = sum(exerted_by.energy for exerted_by in exerted.values()) + sum(each.energy for _, each in along.values())
-    between = {name: on_both.on_b for name, on_both in exerted.items()}
-    return ConnectorOutputs(
-        stored, between, {name: np.array([along_hinge.load]) for name, (_, along_hinge) in along.items()}
-    )
+class Energies(NamedTuple):
+    """J; that of springs without connectors."""
+
+    kinetic: float
+    spring: float
+    gravity: float
+
+
+class TreeObserver:
+    """Base of what reads a tree of links in a peer: puts together what engines exchange."""
+
+    def __init__(self, scene: Scene, links: tuple[Link, ...]) -> None:
+        self._links = links
+        self.gravity = np.array(scene.gravity_m_s2, dtype=float)
+        self._places = {marker.name: attachment(scene, links, marker) for marker in scene.markers}
+
+    def body_motion(self, link: int) -> BodyMotion:
+        """How the frame of a link moves in the state that is observed."""
+        raise NotImplementedError
+
+    def snapshot(
+        self, loads: Iterable[Real] | None, drives: Mapping[str, Real], energies: Energies, momentum: Real, *,
+        closed: Mapping[str, Real] | None = None, exerted: Mapping[str, Exerted] | None = None,
+        along: Mapping[str, tuple[int, Along]] | None = None,
+    ) -> Snapshot:  # fmt: skip
+        """From [torque; force] (6,) on every link about its frame's origin, World axes, None if they are not known, and
+        of closures and couplings by name."""
+        known = [] if loads is None else zip(self._links, loads, strict=True)
+        named = [(link.kind, link.joint, load) for link, load in known]
+        between, held = exerted or {}, {name: each for name, (_, each) in (along or {}).items()}
+        stored = sum(each.energy for each in (*between.values(), *held.values()))
+        return Snapshot(
+            markers={name: self.body_motion(at.link).carrying(at.frame).marker for name, at in self._places.items()},
+            loads={name: load for kind, name, load in named if kind != "wheel"} | dict(closed or {}),
+            wheel_loads={name: load for kind, name, load in named if kind == "wheel"},
+            drives=dict(drives),
+            energy={
+                "kinetic": float(energies.kinetic),
+                "strain": 0.0,
+                "spring": energies.spring + stored,
+                "gravity": float(energies.gravity),
+            },
+            momentum=momentum,
+            connectors={name: each.on_b for name, each in between.items()},
+            hinge_forces={name: np.array([each.load]) for name, each in held.items()},
+        )

@@ -13,11 +13,12 @@ import numpy as np
 
 from crosscheck.engines.basilisk.craft import Craft
 from crosscheck.engines.basilisk.vehicle import Vehicle
-from crosscheck.engines.conventions import cross, quaternion_of, quaternion_rate, rotation_matrix
+from crosscheck.engines.connections import Moving
+from crosscheck.engines.conventions import quaternion_of, quaternion_rate, rotation_matrix, shift_wrench
 from crosscheck.engines.functions_of_time import Profile, profile
-from crosscheck.engines.links import Scalar, attachment
-from crosscheck.engines.rigid_tree import PointLoad
-from flexmb.scene.schema import Load, Scene
+from crosscheck.engines.links import Scalar
+from crosscheck.engines.rigid_tree import TreeLoads
+from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
 _HUB = 13  # numbers of the hub's state
@@ -57,7 +58,7 @@ class CraftDynamics:
         self.rest = np.array([freedom.rest for freedom in freedoms])
         self._damping = np.array([freedom.damping for freedom in freedoms])
         self._chains = [np.array(chain, dtype=np.intp) for chain in craft.chains]
-        self._loads = [_hub_load(craft, scene, load) for load in scene.loads]
+        self._loads = TreeLoads(scene, craft.links, ())
 
     def initial(self) -> Real:
         flight, base = self.craft.flight, self.craft.base
@@ -118,27 +119,15 @@ class CraftDynamics:
         )
 
     def _push(self, t: float, state: CraftState) -> float:
-        """Apply the loads to the hub; returns their power (W)."""
+        """Apply the loads, all of which are on the hub; returns their power (W)."""
         R = rotation_matrix(state.quaternion)
-        in_world, on_hub, torque = np.zeros(3), np.zeros(3), np.zeros(3)
-        for load in self._loads:
-            vector = load.vector(t)
-            own = R.T @ vector if load.fixed_in_world else vector
-            if not load.is_force:
-                torque += own
-            else:
-                torque += cross(load.point, own)
-                if load.fixed_in_world:
-                    in_world += vector
-                else:
-                    on_hub += vector
-        self.vehicle.push(in_world, on_hub, torque)
-        return float((in_world + R @ on_hub) @ state.velocity + torque @ state.turning)
-
-
-def _hub_load(craft: Craft, scene: Scene, load: Load) -> PointLoad:
-    at = attachment(scene, craft.links, load)
-    return PointLoad(load, craft.where[at.link][1] @ at.frame)
+        hub = Moving(state.position, R, R @ state.turning, state.velocity)
+        wrenches, power = self._loads.wrenches(t, lambda link: hub.carrying(self.craft.where[link][1]))
+        total = np.zeros(6)
+        for link, wrench in wrenches.items():
+            total += shift_wrench(wrench, R @ self.craft.where[link][1].position)
+        self.vehicle.push(total[3:], R.T @ total[:3])
+        return power
 
 
 def _motor(freedom: Scalar):

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from importlib.metadata import version
+from collections.abc import Iterator
 
 from crosscheck.engines.basilisk.craft import NoCraft, craft_of
-from crosscheck.engines.contract import Effort, Model
-from crosscheck.engines.links import obstacle
-from crosscheck.engines.peer import PeerEngine, needed
+from crosscheck.engines.contract import Model
+from crosscheck.engines.peer import Library, PeerEngine, TreeCapabilities
 from crosscheck.engines.scipy_loop import RTOL_LADDER, ScipyModel
 from flexmb.scene.schema import Scene
 
@@ -23,23 +22,15 @@ class BasiliskEngine(PeerEngine):
         "SciPy's DOP853, also in Python. Basilisk's own integrators hold torques constant in a step and count time in "
         "whole nanoseconds, which limits their accuracy. Outputs are computed after the timed solve."
     )
+    library = Library("Basilisk", "Basilisk", "bsk")
+    capabilities = TreeCapabilities()
+    ladder = RTOL_LADDER
 
-    def version(self) -> str:
-        with needed("Basilisk", "bsk"):
-            import Basilisk  # noqa: F401
-        return version("bsk")
-
-    def obstacle(self, scene: Scene) -> str:
-        if reason := obstacle(scene, "Basilisk", ()):
-            return reason
+    def refusals(self, scene: Scene) -> Iterator[str]:
         try:
             craft_of(scene)
         except NoCraft as error:
-            return str(error)
-        return ""
-
-    def efforts(self, scene: Scene) -> tuple[Effort, ...]:
-        return RTOL_LADDER
+            yield str(error)
 
     def model(self, scene: Scene) -> Model:
         from crosscheck.engines.basilisk.dynamics import CraftDynamics

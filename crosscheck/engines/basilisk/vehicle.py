@@ -72,10 +72,9 @@ class Vehicle:
         for wheel, torque in zip(self._wheels.ReactionWheelData, torques, strict=True):
             wheel.u_current = float(torque)
 
-    def push(self, force_in_world: Real, force_on_hub: Real, torque_on_hub: Real) -> None:
-        """Forces at the hub's origin in World axes and in hub axes, and the torque about it in hub axes."""
-        self._outside.extForce_N = _column(force_in_world)
-        self._outside.extForce_B = _column(force_on_hub)
+    def push(self, force: Real, torque_on_hub: Real) -> None:
+        """A force at the hub's origin in World axes, and the torque about it in hub axes."""
+        self._outside.extForce_N = _column(force)
         self._outside.extTorquePntB_B = _column(torque_on_hub)
 
     def solve(self, t: float) -> tuple[Real, Real, Real, list[Real]]:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from importlib.metadata import version
-
-from crosscheck.engines.contract import Effort, Model
-from crosscheck.engines.links import links, obstacle
-from crosscheck.engines.peer import PeerEngine, needed
+from crosscheck.engines.contract import Model
+from crosscheck.engines.links import links
+from crosscheck.engines.peer import Library, PeerEngine, TreeCapabilities
 from crosscheck.engines.scipy_loop import RTOL_LADDER, ScipyModel
 from flexmb.scene.schema import Scene
 
@@ -23,17 +21,10 @@ class DartEngine(PeerEngine):
         "of first order with implicit springs and dampers, too inaccurate for a comparison. No contacts. Outputs are "
         "computed after the timed solve."
     )
-
-    def version(self) -> str:
-        with needed("DART", "dartpy"):
-            import dartpy  # noqa: F401
-        return version("dartpy")
-
-    def obstacle(self, scene: Scene) -> str:
-        return _open_loops_only(scene) or obstacle(scene, "DART", ())
-
-    def efforts(self, scene: Scene) -> tuple[Effort, ...]:
-        return RTOL_LADDER
+    library = Library("DART", "dartpy", "dartpy")
+    # its constraints are impulses in a step and no part of the forward dynamics
+    capabilities = TreeCapabilities(loops="closes loops by impulses of its own steps only, to first order")
+    ladder = RTOL_LADDER
 
     def model(self, scene: Scene) -> Model:
         from crosscheck.engines.dart.dynamics import DartDynamics
@@ -42,10 +33,3 @@ class DartEngine(PeerEngine):
 
         dynamics = DartDynamics(build_tree(scene, links(scene)), scene)
         return ScipyModel(scene, dynamics, DartObserver(dynamics, scene))
-
-
-def _open_loops_only(scene: Scene) -> str:
-    """Why a closed loop is refused: DART's constraints are impulses in a step and not part of the forward dynamics."""
-    if not scene.closures:
-        return ""
-    return f'closure "{scene.closures[0].name}": DART closes loops by impulses of its own steps only, to first order'

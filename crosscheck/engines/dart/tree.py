@@ -16,7 +16,7 @@ import numpy as np
 
 from crosscheck.engines.conventions import Frame
 from crosscheck.engines.links import Ball, Floating, Freedom, Link, Scalar, by_motion
-from crosscheck.engines.rigid_tree import Slot, scene_start
+from crosscheck.engines.rigid_tree import Slot
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -64,12 +64,6 @@ def build_tree(scene: Scene, chain: tuple[Link, ...]) -> DartTree:
         body.setInertia(_inertia(link.inertia.mass, link.inertia.com, link.inertia.inertia))
         bodies.append(body)
     return DartTree(skeleton, chain, tuple(bodies), tuple(slots), q)
-
-
-def initial_state(tree: DartTree) -> tuple[Real, Real]:
-    """The scene's coordinates (nq,) and speeds (nv,) at t = 0, those of free joints in outboard axes."""
-    sizes = tree.nq, tree.skeleton.getNumDofs()
-    return scene_start(tree.slots, sizes, lambda flight: [*flight.angular_velocity, *flight.velocity])
 
 
 def _coordinates(freedom: Freedom) -> int:

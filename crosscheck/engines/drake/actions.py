@@ -7,16 +7,13 @@ from pydrake.common.value import Value
 from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialForce, SpatialVelocity
 from pydrake.multibody.plant import ExternallyAppliedSpatialForce
-from pydrake.multibody.tree import BodyIndex
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from crosscheck.engines.connections import WORLD, Along, Exerted, Moving
+from crosscheck.engines.connections import Exerted, Moving
 from crosscheck.engines.conventions import quaternion_of, rotation_vector
 from crosscheck.engines.drake.tree import BALLAST, DrakeSlot, DrakeTree, ball_rotation
 from crosscheck.engines.functions_of_time import profile
-from crosscheck.engines.links import Attachment
-from crosscheck.engines.rigid_tree import PointLoad, TreeConnectors, motors, placed_loads, scalars
-from flexmb.scene.schema import Scene
+from crosscheck.engines.rigid_tree import LinkMotion, TreeLoads, motors, scalars
 from flexmb.typing import Real
 
 
@@ -26,9 +23,9 @@ class JointActions:
     `turned` are the inboard frames of the ball joints, as in `DrakeState`.
     """
 
-    def __init__(self, tree: DrakeTree, scene: Scene) -> None:
+    def __init__(self, tree: DrakeTree, loads: TreeLoads) -> None:
         single = scalars(tree.slots)
-        self._connectors = TreeConnectors(scene, tree.links, tree.slots)
+        self._loads = loads
         self._nv = tree.plant.num_velocities()
         self._motors = motors(tree.slots)
         self._springs = [slot for slot in single if slot.freedom.stiffness < 0.0]
@@ -39,17 +36,13 @@ class JointActions:
         self._sprung = [slot for slot in single if slot.freedom.stiffness]
 
     def __bool__(self) -> bool:
-        return bool(self._motors or self._springs or self._dampers or self._balls or self._connectors.along_hinges)
-
-    def held(self, t: float, q: Real, v: Real) -> dict[str, tuple[int, Along]]:
-        """By name the speed that a connector along a hinge acts on, and what it does."""
-        return self._connectors.along(t, q, v)
+        return bool(self._motors or self._springs or self._dampers or self._balls or self._loads.along_hinges)
 
     def forces(self, t: float, q: Real, v: Real, turned: tuple[Real, ...]) -> Real:
         tau = np.zeros(self._nv)
         for index, motor in self._motors:
             tau[index] += motor(t).value
-        for speed, exerted in self.held(t, q, v).values():
+        for speed, exerted in self._loads.along(t, q, v).values():
             tau[speed] += exerted.load
         for slot in self._springs:
             tau[slot.v] -= slot.freedom.stiffness * (q[slot.q] - slot.freedom.rest)
@@ -90,51 +83,39 @@ class Drives:
 
 
 class DrakeLoads:
-    """Forces and torques at nodes of bodies, and of connectors between them, in World axes at points of the bodies.
+    """What acts on links, as forces on Drake's bodies at their origins, in World axes.
 
     `poses` are X_WB of all bodies by their index, `speeds` their spatial velocities V_WB.
     """
 
-    def __init__(self, tree: DrakeTree, scene: Scene) -> None:
-        self._loads = [(tree.bodies[link].index(), load) for link, load in placed_loads(scene, tree.links)]
-        self._connectors, self._bodies = TreeConnectors(scene, tree.links, tree.slots), tree.bodies
+    def __init__(self, tree: DrakeTree, loads: TreeLoads) -> None:
+        self._loads, self._bodies = loads, [body.index() for body in tree.bodies]
 
     def __bool__(self) -> bool:
-        return bool(self._loads or self._connectors.between)
+        return self._loads.on_links
 
     def applied(
         self, t: float, poses: list[RigidTransform], speeds: list[SpatialVelocity]
     ) -> list[ExternallyAppliedSpatialForce]:
-        wrenches = [_applied(t, poses, body, load) for body, load in self._loads]
-        for at, load in self._connectors.loads(self.exerted(t, poses, speeds)):
-            body = self._bodies[at.link].index()
-            wrenches.append(_wrench(body, at.frame.position, SpatialForce(load[:3], load[3:])))
-        return wrenches
+        wrenches, _ = self._loads.wrenches(t, self._motion(poses, speeds))
+        forces = []
+        for link, wrench in wrenches.items():
+            force = ExternallyAppliedSpatialForce()
+            force.body_index, force.p_BoBq_B = self._bodies[link], np.zeros(3)
+            force.F_Bq_W = SpatialForce(wrench[:3], wrench[3:])
+            forces.append(force)
+        return forces
 
     def exerted(self, t: float, poses: list[RigidTransform], speeds: list[SpatialVelocity]) -> dict[str, Exerted]:
         """What connectors between nodes do, by name."""
+        return self._loads.exerted(t, self._motion(poses, speeds))
 
-        def frame(at: Attachment) -> Moving:
-            if at.link < 0:
-                return WORLD.carrying(at.frame)
-            k = int(self._bodies[at.link].index())
-            pose, V = poses[k], speeds[k]
-            moving = Moving(pose.translation(), pose.rotation().matrix(), V.rotational(), V.translational())
-            return moving.carrying(at.frame)
+    def _motion(self, poses: list[RigidTransform], speeds: list[SpatialVelocity]) -> LinkMotion:
+        def of_link(link: int) -> Moving:
+            pose, V = poses[k := int(self._bodies[link])], speeds[k]
+            return Moving(pose.translation(), pose.rotation().matrix(), V.rotational(), V.translational())
 
-        return self._connectors.exerted(t, frame)
-
-
-def _applied(t: float, poses: list[RigidTransform], body: BodyIndex, load: PointLoad) -> ExternallyAppliedSpatialForce:
-    vector, nothing = load.in_world(t, poses[int(body)].rotation().matrix()), np.zeros(3)
-    return _wrench(body, load.point, SpatialForce(*((nothing, vector) if load.is_force else (vector, nothing))))
-
-
-def _wrench(body: BodyIndex, point: Real, load: SpatialForce) -> ExternallyAppliedSpatialForce:
-    """A load about a point (3,) of a body, World axes."""
-    applied = ExternallyAppliedSpatialForce()
-    applied.body_index, applied.p_BoBq_B, applied.F_Bq_W = body, point, load
-    return applied
+        return of_link
 
 
 class DrakeActions(LeafSystem):

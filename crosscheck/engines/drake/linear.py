@@ -29,7 +29,7 @@ from crosscheck.engines.linear.coordinates import obstacle
 from crosscheck.engines.linear.matrices import LinearMatrices, exact, quaternion_transport
 from crosscheck.engines.linear.slots import slot_places
 from crosscheck.engines.links import Ball, Floating, Scalar
-from crosscheck.engines.rigid_tree import PointLoad, placed_loads
+from crosscheck.engines.rigid_tree import PointLoad, TreeLoads
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -57,8 +57,9 @@ def _without_derivative(slot: DrakeSlot) -> bool:
 class DrakeLinear:
     def __init__(self, tree: DrakeTree, scene: Scene) -> None:
         self._tree = tree
-        self._joints, self._drives = JointActions(tree, scene), Drives(tree)
-        self._loads = [(tree.bodies[link].index(), load) for link, load in placed_loads(scene, tree.links)]
+        loads = TreeLoads(scene, tree.links, tree.slots)
+        self._joints, self._drives = JointActions(tree, loads), Drives(tree)
+        self._loads = [(tree.bodies[link].index(), load) for link, load in loads.at_nodes]
         self._plain = tree.plant.CreateDefaultContext()
         self._plant = tree.plant.ToAutoDiffXd()
         self._context = self._plant.CreateDefaultContext()

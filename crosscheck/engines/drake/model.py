@@ -17,6 +17,7 @@ from crosscheck.engines.drake.tree import DrakeState, build_tree, initial_state,
 from crosscheck.engines.functions_of_time import breaks_between, scene_functions
 from crosscheck.engines.linear.outputs import outputs
 from crosscheck.engines.links import links
+from crosscheck.engines.rigid_tree import TreeLoads
 from crosscheck.engines.trajectories import stack
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
@@ -29,7 +30,8 @@ class DrakeModel:
         chain = links(scene)
         self._tree = build_tree(scene, chain, ballasted=True)
         self._drives = Drives(self._tree)
-        joints, loads = JointActions(self._tree, scene), DrakeLoads(self._tree, scene)
+        given = TreeLoads(scene, chain, self._tree.slots)
+        joints, loads = JointActions(self._tree, given), DrakeLoads(self._tree, given)
         self._actions = DrakeActions(self._tree, joints, self._drives, loads)
         self._diagram = self._connected(bool(joints or self._drives), bool(loads))
         self._observer = DrakeObserver(build_tree(scene, chain, ballasted=False), scene)

@@ -7,17 +7,15 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialVelocity
 from pydrake.multibody.tree import MultibodyForces
 
-from crosscheck.engines.contract import MarkerSnapshot, Snapshot
-from crosscheck.engines.conventions import cross, quaternion_of
+from crosscheck.engines.contract import Snapshot
 from crosscheck.engines.drake.actions import DrakeLoads, Drives, JointActions
 from crosscheck.engines.drake.tree import DrakeState, DrakeTree, place
-from crosscheck.engines.links import Attachment, attachment
-from crosscheck.engines.rigid_tree import by_joint, connector_outputs, of_kind
+from crosscheck.engines.rigid_tree import BodyMotion, Energies, TreeLoads, TreeObserver, by_joint
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
 
-class DrakeObserver:
+class DrakeObserver(TreeObserver):
     """Reads a plant whose rotors are armatures alone: Drake counts rotors in energies and inverse dynamics.
 
     Drake's reaction is what a joint's constraint and its forces together do to the child body, about the child's frame
@@ -25,13 +23,11 @@ class DrakeObserver:
     """
 
     def __init__(self, tree: DrakeTree, scene: Scene) -> None:
-        self._tree = tree
+        super().__init__(scene, tree.links)
+        self._tree, self._given = tree, TreeLoads(scene, tree.links, tree.slots)
         self._context = tree.plant.CreateDefaultContext()
-        self._joints, self._drives = JointActions(tree, scene), Drives(tree)
-        self._loads = DrakeLoads(tree, scene)
-        self._gravity = np.array(scene.gravity_m_s2, dtype=float)
-        self._names = [(link.kind, link.joint) for link in tree.links]
-        self._markers = {marker.name: attachment(scene, tree.links, marker) for marker in scene.markers}
+        self._joints, self._drives = JointActions(tree, self._given), Drives(tree)
+        self._loads = DrakeLoads(tree, self._given)
 
     def observe(self, t: float, state: DrakeState, acceleration: Real) -> Snapshot:
         """`acceleration` (nv,) is that of the plant with the drives' rotors in the same state."""
@@ -39,25 +35,16 @@ class DrakeObserver:
         context.SetTime(t)
         place(self._tree, context, state)
         drives = self._act(t, state, acceleration)
-        loads = dict(zip(self._names, self._reactions(), strict=True))
-        connected = connector_outputs(self._loads.exerted(t, *self._motion()), self._joints.held(t, state.q, state.v))
         momentum = plant.CalcSpatialMomentumInWorldAboutPoint(context, np.zeros(3))
         centre = plant.CalcCenterOfMassPositionInWorld(context)
-        return Snapshot(
-            markers={name: self._marker(at) for name, at in self._markers.items()},
-            loads=of_kind("body", loads),
-            wheel_loads=of_kind("wheel", loads),
-            drives=drives,
-            energy={
-                "kinetic": plant.CalcKineticEnergy(context),
-                "strain": 0.0,
-                "spring": self._joints.spring_energy(state.q, state.turned) + connected.energy,
-                "gravity": -float(plant.CalcTotalMass(context) * (centre @ self._gravity)),
-            },
-            momentum=np.concatenate([momentum.rotational(), momentum.translational()]),
-            connectors=connected.between,
-            hinge_forces=connected.along,
-        )
+        energies = Energies(
+            plant.CalcKineticEnergy(context), self._joints.spring_energy(state.q, state.turned),
+            -plant.CalcTotalMass(context) * (centre @ self.gravity),
+        )  # fmt: skip
+        return self.snapshot(
+            self._reactions(), drives, energies, np.concatenate([momentum.rotational(), momentum.translational()]),
+            exerted=self._loads.exerted(t, *self._motion()), along=self._given.along(t, state.q, state.v),
+        )  # fmt: skip
 
     def _act(self, t: float, state: DrakeState, acceleration: Real) -> dict[str, Real]:
         """Apply motors, loads and drives to the plant; the drives, by joint name, from inverse dynamics."""
@@ -68,8 +55,7 @@ class DrakeObserver:
         plant.CalcForceElementsContribution(context, forces)  # gravity, springs and dampers
         for load in applied:
             body = plant.get_body(load.body_index)
-            arm = body.EvalPoseInWorld(context).rotation().matrix() @ load.p_BoBq_B
-            body.AddInForce(context, arm, load.F_Bq_W, plant.world_frame(), forces)
+            body.AddInForce(context, load.p_BoBq_B, load.F_Bq_W, plant.world_frame(), forces)
         needed = plant.CalcInverseDynamics(context, acceleration, forces) - tau
         driven = [slot.v for slot in self._drives.slots]
         tau[driven] += needed[driven]
@@ -94,18 +80,11 @@ class DrakeObserver:
             loads.append(np.concatenate([R @ load.rotational(), R @ load.translational()]))
         return loads
 
-    def _marker(self, at: Attachment) -> MarkerSnapshot:
-        body, context = self._tree.bodies[at.link], self._context
-        pose = body.EvalPoseInWorld(context)
-        R = pose.rotation().matrix()
-        arm = R @ at.frame.position
-        velocity, acceleration = body.EvalSpatialVelocityInWorld(context), body.EvalSpatialAccelerationInWorld(context)
-        w, alpha = velocity.rotational(), acceleration.rotational()
-        v = velocity.translational() + cross(w, arm)
-        a = acceleration.translational() + cross(alpha, arm) + cross(w, cross(w, arm))
-        return MarkerSnapshot(
-            position=pose.translation() + arm,
-            quaternion=quaternion_of(R @ at.frame.rotation),
-            velocity=np.concatenate([w, v]),
-            acceleration=np.concatenate([alpha, a]),
-        )
+    def body_motion(self, link: int) -> BodyMotion:
+        body, context = self._tree.bodies[link], self._context
+        pose, velocity = body.EvalPoseInWorld(context), body.EvalSpatialVelocityInWorld(context)
+        acceleration = body.EvalSpatialAccelerationInWorld(context)
+        return BodyMotion(
+            pose.translation(), pose.rotation().matrix(), velocity.rotational(), velocity.translational(),
+            acceleration.rotational(), acceleration.translational(),
+        )  # fmt: skip

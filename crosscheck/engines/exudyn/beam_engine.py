@@ -11,16 +11,17 @@ from math import sqrt
 
 import numpy as np
 
-from crosscheck.engines.contract import Effort, MarkerPath, MarkerSnapshot, Model, Run, Snapshot, Support, Trajectory
-from crosscheck.engines.exudyn import library
+from crosscheck.engines.contract import Effort, MarkerPath, MarkerSnapshot, Model, Run, Snapshot, Trajectory
 from crosscheck.engines.exudyn.beams import PlanarBeam, assemble_beam, axis_sign, floats, root_frame
 from crosscheck.engines.exudyn.kkt import initial_state
+from crosscheck.engines.exudyn.library import LIBRARY
 from crosscheck.engines.exudyn.model import ExudynModel
 from crosscheck.engines.exudyn.solve import integrate
 from crosscheck.engines.exudyn.spatial import fastest_bending, reason, spatial_refusals
 from crosscheck.engines.exudyn.state import States
 from crosscheck.engines.pace import pace
-from crosscheck.engines.steps import USUAL_S, ladder
+from crosscheck.engines.peer import PeerEngine
+from crosscheck.engines.steps import ladder
 from flexmb.scene.hinges import AngularCoordinate, Hinge, LinearCoordinate, Planar, Revolute, Weld
 from flexmb.scene.rest_curve import is_curved
 from flexmb.scene.schema import BeamBody, Marker, Scene
@@ -35,7 +36,7 @@ RUNGS, USUAL = 3, 800
 are stepped over."""
 
 
-class ExudynBeamEngine:
+class ExudynBeamEngine(PeerEngine):
     """Beams as elements of finite deflection: one in World's x-y plane, or any in space with rigid bodies."""
 
     name = "exudyn-beam"
@@ -50,28 +51,22 @@ class ExudynBeamEngine:
         "modes, so its error contains the distance of the models."
     )
 
-    def version(self) -> str:
-        """Version of the library; raises EngineMissing where it is not installed."""
-        return library.version()
+    library = LIBRARY
 
-    def supports(self, scene: Scene) -> Support:
-        """"surrogate" for the scenes it takes: another model of the beam than its modes, and a richer one."""
-        if _in_plane(scene):
-            return Support("surrogate", "a planar beam of finite deflection instead of modes")
-        for refused in spatial_refusals(scene):
-            return Support("no", refused)
-        return Support("surrogate", reason(scene))
+    def refusals(self, scene: Scene) -> Iterator[str]:
+        return iter(()) if _in_plane(scene) else spatial_refusals(scene)
 
-    def efforts(self, scene: Scene) -> tuple[Effort, ...]:
-        return self.efforts_for(scene, USUAL_S)
+    def approximations(self, scene: Scene) -> Iterator[str]:
+        """All scenes: it is another model of the beam than its modes, and a richer one."""
+        yield "a planar beam of finite deflection instead of modes" if _in_plane(scene) else reason(scene)
 
     def efforts_for(self, scene: Scene, duration_s: float) -> tuple[Effort, ...]:
         """Three steps, with the scene's number of elements; generalised-alpha damps the axial vibrations it skips."""
         fastest = _first_bending(scene) if _in_plane(scene) else fastest_bending(scene)
         return ladder("GeneralizedAlpha", pace(scene, duration_s, fastest), duration_s, RUNGS, USUAL)
 
-    def compile(self, scene: Scene) -> Model:
-        """Convert the scene; the mesh has as many elements as the scene's beams."""
+    def model(self, scene: Scene) -> Model:
+        """The mesh has as many elements as the scene's beams."""
         if _in_plane(scene):
             return BeamModel(assemble_beam(scene, scene.bodies[0].elements))
         return ExudynModel(scene)

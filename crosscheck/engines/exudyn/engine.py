@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from crosscheck.engines.contract import Effort, Model, Support
-from crosscheck.engines.exudyn import library
+from collections.abc import Iterator
+
+from crosscheck.engines.contract import Effort, Model
 from crosscheck.engines.exudyn.assembly import flexible, unconstrained
+from crosscheck.engines.exudyn.library import LIBRARY
 from crosscheck.engines.exudyn.solve import EXPLICIT
-from crosscheck.engines.exudyn.support import supports
+from crosscheck.engines.exudyn.support import approximations, refusals
 from crosscheck.engines.pace import fastest_mode, pace
-from crosscheck.engines.steps import USUAL_S, ladder
+from crosscheck.engines.peer import PeerEngine
+from crosscheck.engines.steps import ladder
 from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.schema import ModalBody, Scene
 
 RUNGS = 3
 
 
-class ExudynEngine:
+class ExudynEngine(PeerEngine):
+    library = LIBRARY
     name = "exudyn"
     takes = ("connectors",)
     summary = "rigid bodies and floating frames in redundant coordinates"
@@ -29,16 +33,11 @@ class ExudynEngine:
         "made again with other settings, and only the one that is taken counts as time."
     )
 
-    def version(self) -> str:
-        """Version of the library; raises EngineMissing where it is not installed."""
-        return library.version()
+    def refusals(self, scene: Scene) -> Iterator[str]:
+        return refusals(scene, scene.bodies)
 
-    def supports(self, scene: Scene) -> Support:
-        """How exactly Exudyn represents the scene, with the reason."""
-        return supports(scene)
-
-    def efforts(self, scene: Scene) -> tuple[Effort, ...]:
-        return self.efforts_for(scene, USUAL_S)
+    def approximations(self, scene: Scene) -> Iterator[str]:
+        return approximations(scene)
 
     def efforts_for(self, scene: Scene, duration_s: float) -> tuple[Effort, ...]:
         """One free body: error-controlled steps; else the trapezoidal rule at three steps, each half the one before.
@@ -49,7 +48,7 @@ class ExudynEngine:
             return tuple(Effort("tolerance", tolerance, EXPLICIT) for tolerance in (1e-7, 1e-9, 1e-11))
         return ladder("TrapezoidalIndex2", pace(scene, duration_s, _fastest_mode(scene)), duration_s, RUNGS)
 
-    def compile(self, scene: Scene) -> Model:
+    def model(self, scene: Scene) -> Model:
         from crosscheck.engines.exudyn.model import ExudynModel
 
         return ExudynModel(scene)

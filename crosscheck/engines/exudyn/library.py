@@ -5,39 +5,27 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
-from importlib.metadata import PackageNotFoundError
-from importlib.metadata import version as installed_version
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 
-from crosscheck.engines.contract import EngineMissing
+from crosscheck.engines.peer import Library, needed
 from flexmb.typing import Real
 
-REMEDY = "Exudyn is not installed: pip install exudyn"
+LIBRARY = Library("Exudyn", __name__, "exudyn")  # this module imports it when it is used
 
 
 @cache
 def load() -> ModuleType:
     """The module `exudyn` with `exudyn.itemInterface` loaded; raises EngineMissing where it is not installed."""
-    try:
+    with needed(LIBRARY.words, LIBRARY.distribution):
         import exudyn
         import exudyn.itemInterface
-    except ImportError as error:
-        raise EngineMissing(REMEDY) from error
     exudyn.special.userInterface.SuppressAll()
     exudyn.config.suppressWarnings = True
     exudyn.config.printToConsole = False
     return exudyn
-
-
-def version() -> str:
-    """Version of the installed library; raises EngineMissing where there is none."""
-    try:
-        return installed_version("exudyn")
-    except PackageNotFoundError as error:
-        raise EngineMissing(REMEDY) from error
 
 
 def matrix(values: Real):

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import assert_never
 
-from crosscheck.engines.contract import Support
 from crosscheck.engines.exudyn.assembly import deforming, flexible
 from crosscheck.engines.links import first_armature, first_screw
 from flexmb.scene.hinges import Free
@@ -17,14 +16,6 @@ NOT_WORKLESS = (
     "it hangs on a deforming node: Exudyn's marker averages mesh points there, and its joint is not workless "
     "(2e-5 to 8e-4 of the energy)"
 )
-
-
-def supports(scene: Scene) -> Support:
-    """"no" with the first reason, else "surrogate" with all reasons, else "exact"."""
-    for reason in refusals(scene, scene.bodies):
-        return Support("no", reason)
-    weak = tuple(dict.fromkeys(_approximations(scene)))
-    return Support("surrogate", "; ".join(weak)) if weak else Support("exact")
 
 
 def refusals(scene: Scene, floating: Sequence[Body]) -> Iterator[str]:
@@ -79,7 +70,8 @@ def _body_refusals(body: Body) -> Iterator[str]:
             assert_never(body)
 
 
-def _approximations(scene: Scene) -> Iterator[str]:
+def approximations(scene: Scene) -> Iterator[str]:
+    """What Exudyn represents to a finite order only."""
     bodies = {body.name: body for body in scene.bodies}
     for hinge in scene.hinges:
         outboard_free = isinstance(hinge, Free)

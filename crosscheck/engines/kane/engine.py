@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import assert_never
 
-from crosscheck.engines.contract import Effort, Model, Support
+from crosscheck.engines.contract import Model
+from crosscheck.engines.peer import PeerEngine
 from crosscheck.engines.scipy_loop import RTOL_LADDER, ScipyModel
 from flexmb.scene.bodies import BeamBody, Body, ModalBody, RigidBody, SidBody
 from flexmb.scene.hinges import (
@@ -27,7 +28,7 @@ VERSION = "1"
 """Of the equations: it changes with their answers."""
 
 
-class KaneEngine:
+class KaneEngine(PeerEngine):
     """Trees with bodies of level "full", exact, by equations that flexmb has no part in."""
 
     name = "kane"
@@ -38,22 +39,15 @@ class KaneEngine:
         "NumPy, called by SciPy's DOP853: a witness, not a rival. It shares no mechanics with flexmb, and is written "
         "to be read, not to be fast. Outputs are computed after the timed solve."
     )
+    ladder = RTOL_LADDER
 
     def version(self) -> str:
         return VERSION
 
-    def supports(self, scene: Scene) -> Support:
-        reason = next(_obstacles(scene), "")
-        return Support("no", reason) if reason else Support("exact")
+    def refusals(self, scene: Scene) -> Iterator[str]:
+        return _obstacles(scene)
 
-    def efforts(self, scene: Scene) -> tuple[Effort, ...]:
-        return RTOL_LADDER
-
-    def compile(self, scene: Scene) -> Model:
-        """ValueError for a scene that the engine refuses."""
-        support = self.supports(scene)
-        if support.kind == "no":
-            raise ValueError(f'scene "{scene.name}": {support.reason}')
+    def model(self, scene: Scene) -> Model:
         return compiled(scene)
 
 

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from crosscheck.engines.contract import Effort, Model, Support
+from crosscheck.engines.contract import Effort, Model
 from crosscheck.engines.kratos import library
 from crosscheck.engines.kratos.efforts import steps_and_meshes
-from crosscheck.engines.steps import USUAL_S
+from crosscheck.engines.peer import PeerEngine
 from flexmb.scene.freedoms import ScalarFreedom
 from flexmb.scene.hinges import AngularCoordinate, Hinge, LinearCoordinate, Planar, Revolute, Weld
 from flexmb.scene.schema import BeamBody, Scene
@@ -23,7 +23,7 @@ REASON = (
 )
 
 
-class KratosEngine:
+class KratosEngine(PeerEngine):
     """One beam on the ground, by Kratos' corotational elements and its own implicit time integration."""
 
     name = "kratos"
@@ -40,24 +40,18 @@ class KratosEngine:
         """Version of the library; raises EngineMissing where it is not installed."""
         return library.version()
 
-    def supports(self, scene: Scene) -> Support:
-        """Of the scenes it takes "surrogate": another model of the beam than its modes, and a richer one."""
-        for refused in _refusals(scene):
-            return Support("no", refused)
-        return Support("surrogate", REASON)
+    def refusals(self, scene: Scene) -> Iterator[str]:
+        return _refusals(scene)
 
-    def efforts(self, scene: Scene) -> tuple[Effort, ...]:
-        return self.efforts_for(scene, USUAL_S)
+    def approximations(self, scene: Scene) -> Iterator[str]:
+        """All scenes: it is another model of the beam than its modes, and a richer one."""
+        yield REASON
 
     def efforts_for(self, scene: Scene, duration_s: float) -> tuple[Effort, ...]:
         """Three steps, each half the one before, with elements of half the length too."""
         return steps_and_meshes(scene, duration_s)
 
-    def compile(self, scene: Scene) -> Model:
-        """EngineMissing without the library; ValueError for a scene that the engine does not take."""
-        self.version()
-        for refused in _refusals(scene):
-            raise ValueError(f'scene "{scene.name}": {refused}')
+    def model(self, scene: Scene) -> Model:
         from crosscheck.engines.kratos.model import KratosModel
 
         return KratosModel(scene)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from crosscheck.engines.connections import KNOWN
-from crosscheck.engines.contract import Effort, Model, Support
-from crosscheck.engines.hybrid.refusals import is_hybrid, refusal
-from crosscheck.engines.links import is_bare_frame, links, obstacle
+from crosscheck.engines.contract import Effort, Model
+from crosscheck.engines.hybrid.refusals import is_hybrid
+from crosscheck.engines.links import is_bare_frame, links
 from crosscheck.engines.pace import pace
-from crosscheck.engines.peer import PeerEngine, inertia_obstacle, needed
-from crosscheck.engines.steps import USUAL_S, ladder
+from crosscheck.engines.peer import Library, PeerEngine, TreeCapabilities, inertia_refusals
+from crosscheck.engines.steps import ladder
 from flexmb.scene.schema import Scene
 
 _RUNGS = 4
@@ -32,23 +34,17 @@ class MujocoEngine(PeerEngine):
         "functions of time are callbacks in Python where a scene has them. Scenes with events or controllers are "
         "stepped in Python, by the same method around its accelerations. Outputs are computed after the timed solve."
     )
+    library = Library("MuJoCo", "mujoco", "mujoco")
+    capabilities = TreeCapabilities(("spherical", "revolute", "weld"), KNOWN, couplings=True, armatures=True)
 
-    def version(self) -> str:
-        with needed("MuJoCo", "mujoco"):
-            import mujoco
-        return mujoco.__version__
+    def refusals(self, scene: Scene) -> Iterator[str]:
+        yield from inertia_refusals((link for link in links(scene) if not is_bare_frame(link)), "MuJoCo")
+        if is_hybrid(scene) and scene.constraints:
+            yield _CLOSED
 
-    def obstacle(self, scene: Scene) -> str:
-        reason = obstacle(scene, "MuJoCo", ("spherical", "revolute", "weld"), KNOWN, couplings=True, armatures=True)
-        reason = reason or inertia_obstacle((link for link in links(scene) if not is_bare_frame(link)), "MuJoCo")
-        return reason or refusal(scene) or (_CLOSED if is_hybrid(scene) and scene.constraints else "")
-
-    def supports(self, scene: Scene) -> Support:
-        support = super().supports(scene)
-        return Support("surrogate", _SOFT) if support.kind == "exact" and scene.constraints else support
-
-    def efforts(self, scene: Scene) -> tuple[Effort, ...]:
-        return self.efforts_for(scene, USUAL_S)
+    def approximations(self, scene: Scene) -> Iterator[str]:
+        if scene.constraints:
+            yield _SOFT
 
     def efforts_for(self, scene: Scene, duration_s: float) -> tuple[Effort, ...]:
         """Steps by halves; the coarsest fits the scene's fastest motion."""

@@ -10,14 +10,12 @@ from contextlib import contextmanager
 import mujoco
 import numpy as np
 
-from crosscheck.engines.connections import WORLD, Along, Exerted, Moving
-from crosscheck.engines.conventions import cross
+from crosscheck.engines.connections import Moving
+from crosscheck.engines.conventions import cross, shift_wrench
 from crosscheck.engines.functions_of_time import Signals, profile
-from crosscheck.engines.links import Attachment
-from crosscheck.engines.mujoco.tree import ARMATURE, MujocoSlot, MujocoTree
-from crosscheck.engines.rigid_tree import JointForces, PointLoad, TreeConnectors, motors, placed_loads
+from crosscheck.engines.mujoco.tree import ARMATURE, COUNTING, MujocoSlot, MujocoTree
+from crosscheck.engines.rigid_tree import JointForces, TreeLoads, motors
 from flexmb.scene.schema import Scene
-from flexmb.typing import Real
 
 
 class Forces:
@@ -34,15 +32,13 @@ class Forces:
         self._motors = motors(tree.slots, signals)
         self._pushed: tuple[float, list[tuple[int, float]]] = np.nan, []  # the last result of `_pushes`, with its time
         self._follows_time = signals is None  # alone
-        self._loads = [_BodyWrench(tree, link, load) for link, load in placed_loads(scene, tree.links, signals)]
-        self.spring_energy = JointForces(tree.slots, tree.model.nv, _unit, signals).spring_energy
-        self.connections = MujocoConnections(tree, scene)
-        self._connected = bool(self.connections)
+        self._tree, self.loads = tree, TreeLoads(scene, tree.links, tree.slots, signals)
+        self.spring_energy = JointForces(tree.slots, tree.model.nv, COUNTING, signals).spring_energy
         self.before_end = np.inf
 
     @contextmanager
     def active(self) -> Iterator[None]:
-        if not (self._motions or self._motors or self._loads or self.connections):
+        if not (self._motions or self._motors or self.loads.on_links or self.loads.along_hinges):
             yield
             return
         mujoco.set_mjcb_control(self._apply)
@@ -58,16 +54,28 @@ class Forces:
 
     def _apply(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         t = min(data.time, self.before_end)
-        if self._connected:
-            data.qfrc_applied[:] = 0.0
-        applied = data.qfrc_applied
+        applied, loads = data.qfrc_applied, self.loads
+        if loads.between or loads.along_hinges:
+            applied[:] = 0.0
         for index, push in self._pushes(t):
             applied[index] = push
-        if self._loads or self._connected:
+        for index, along in loads.along(t, data.qpos, data.qvel).values():
+            applied[index] += along.load
+        if loads.on_links:
             data.xfrc_applied[:] = 0.0
-            for load in self._loads:
-                load.add(t, data)
-            self.connections.add(t, data)
+            wrenches, _ = loads.wrenches(t, lambda link: self.link_motion(link, data))
+            for link, wrench in wrenches.items():
+                body = self._tree.bodies[link]
+                torque, force = shift_wrench(wrench, data.xpos[body] - data.xipos[body]).reshape(2, 3)
+                data.xfrc_applied[body] = np.concatenate([force, torque])
+
+    def link_motion(self, link: int, data: mujoco.MjData) -> Moving:
+        """How the frame of a link moves; positions and velocities of `data` are up to date."""
+        body = self._tree.bodies[link]
+        w, position = data.cvel[body, :3], data.xpos[body]
+        pole = data.subtree_com[self._tree.model.body_rootid[body]]
+        linear = data.cvel[body, 3:] + cross(w, position - pole)
+        return Moving(position, data.xmat[body].reshape(3, 3), w, linear)
 
     def _pushes(self, t: float) -> list[tuple[int, float]]:
         """Indices of speeds with their motor loads or the loads of their prescribed motion.
@@ -79,61 +87,3 @@ class Forces:
             following = [(v, ARMATURE * motion(t).acceleration) for _, v, motion in self._motions]
             self._pushed = t, efforts + following
         return self._pushed[1]
-
-
-class _BodyWrench:
-    """A force or torque at a node, handed to MuJoCo as a wrench [force; torque] at the mass centre in World axes."""
-
-    def __init__(self, tree: MujocoTree, link: int, load: PointLoad) -> None:
-        self._body, self._load = int(tree.bodies[link]), load
-        self._arm = load.point - tree.links[link].inertia.com
-
-    def add(self, t: float, data: mujoco.MjData) -> None:
-        R = data.xmat[self._body].reshape(3, 3)
-        vector = self._load.in_world(t, R)
-        if self._load.is_force:
-            data.xfrc_applied[self._body, :3] += vector
-            data.xfrc_applied[self._body, 3:] += cross(R @ self._arm, vector)
-        else:
-            data.xfrc_applied[self._body, 3:] += vector
-
-
-def _unit(quaternion: Real) -> Real:
-    return quaternion / np.linalg.norm(quaternion)
-
-
-class MujocoConnections:
-    """Evaluated in the control callback, where positions and velocities of `data` are up to date."""
-
-    def __init__(self, tree: MujocoTree, scene: Scene) -> None:
-        self._tree = tree
-        self._connectors = TreeConnectors(scene, tree.links, tree.slots)
-
-    def __bool__(self) -> bool:
-        return bool(self._connectors)
-
-    def exerted(self, t: float, data: mujoco.MjData) -> dict[str, Exerted]:
-        """What connectors between nodes do, by name."""
-        return self._connectors.exerted(t, lambda at: self._frame(at, data))
-
-    def along(self, t: float, data: mujoco.MjData) -> dict[str, tuple[int, Along]]:
-        """By name the speed that a connector along a hinge acts on, and what it does."""
-        return self._connectors.along(t, data.qpos, data.qvel)
-
-    def add(self, t: float, data: mujoco.MjData) -> None:
-        for at, load in self._connectors.loads(self.exerted(t, data)):
-            body = self._tree.bodies[at.link]
-            arm = self._frame(at, data).position - data.xipos[body]
-            data.xfrc_applied[body, :3] += load[3:]
-            data.xfrc_applied[body, 3:] += load[:3] + cross(arm, load[3:])
-        for speed, held in self.along(t, data).values():
-            data.qfrc_applied[speed] += held.load
-
-    def _frame(self, at: Attachment, data: mujoco.MjData) -> Moving:
-        if at.link < 0:
-            return WORLD.carrying(at.frame)
-        body = self._tree.bodies[at.link]
-        w, position = data.cvel[body, :3], data.xpos[body]
-        pole = data.subtree_com[self._tree.model.body_rootid[body]]
-        linear = data.cvel[body, 3:] + cross(w, position - pole)
-        return Moving(position, data.xmat[body].reshape(3, 3), w, linear).carrying(at.frame)

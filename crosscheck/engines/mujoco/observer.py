@@ -6,17 +6,17 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.engines.contract import MarkerSnapshot, Snapshot
-from crosscheck.engines.conventions import cross, quaternion_of, shift_wrench
-from crosscheck.engines.links import Attachment, Scalar, attachment, by_motion
+from crosscheck.engines.contract import Snapshot
+from crosscheck.engines.conventions import cross, shift_wrench
+from crosscheck.engines.links import Scalar, by_motion
 from crosscheck.engines.mujoco.forces import Forces
 from crosscheck.engines.mujoco.tree import MujocoClosure, MujocoTree
-from crosscheck.engines.rigid_tree import by_joint, connector_outputs, of_kind, placed_couplings
+from crosscheck.engines.rigid_tree import BodyMotion, Energies, TreeObserver, by_joint, placed_couplings
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
 
-class MujocoObserver:
+class MujocoObserver(TreeObserver):
     """Reads `data` after `mj_forward` and `mj_rnePostConstraint`.
 
     MuJoCo's spatial vectors (`cvel`, `cacc`, `cfrc_int`) are [angular; linear] in World axes about the mass centre of
@@ -27,41 +27,36 @@ class MujocoObserver:
     def __init__(
         self, tree: MujocoTree, forces: Forces, scene: Scene, closures: tuple[MujocoClosure, ...] = ()
     ) -> None:
-        self._tree = tree
-        self._forces = forces
-        self._gravity = np.array(scene.gravity_m_s2, dtype=float)
-        self._names = [(link.kind, link.joint) for link in tree.links]
+        super().__init__(scene, tree.links)
+        self._tree, self._forces, self._data = tree, forces, mujoco.MjData(tree.model)
         self._closures, self._couplings = closures, placed_couplings(scene, tree.slots)
+        self._numbers = {body: link for link, body in enumerate(tree.bodies.tolist())}
         self._armature = np.zeros(tree.model.nv)
         for slot in tree.slots:
             if isinstance(slot.freedom, Scalar):
                 self._armature[slot.v] = slot.freedom.armature
-        self._markers = {marker.name: attachment(scene, tree.links, marker) for marker in scene.markers}
 
     def observe(self, data: mujoco.MjData) -> Snapshot:
         model = self._tree.model
         with self._forces.active():
             mujoco.mj_forward(model, data)
         mujoco.mj_rnePostConstraint(model, data)
-        loads = dict(zip(self._names, self._loads(data), strict=True))
-        kinetic, momentum = self._motion(data)
-        mass, connections = model.body_mass, self._forces.connections
-        connected = connector_outputs(connections.exerted(data.time, data), connections.along(data.time, data))
-        return Snapshot(
-            markers={name: self._marker(at, data) for name, at in self._markers.items()},
-            loads=of_kind("body", loads) | of_kind("point mass", loads) | self._closed(data),
-            wheel_loads=of_kind("wheel", loads),
-            drives=self._drives(data, loads),
-            energy={
-                "kinetic": kinetic,
-                "strain": 0.0,
-                "spring": self._forces.spring_energy(data.qpos) + connected.energy,
-                "gravity": -float(mass @ data.xipos @ self._gravity),
-            },
-            momentum=momentum,
-            connectors=connected.between,
-            hinge_forces=connected.along,
-        )
+        self._data, applied = data, self._forces.loads
+        loads, (kinetic, momentum) = self._loads(data), self._motion(data)
+        weight = -float(model.body_mass @ data.xipos @ self.gravity)
+        energies = Energies(kinetic, self._forces.spring_energy(data.qpos), weight)
+        return self.snapshot(
+            loads, self._drives(data, loads), energies, momentum,
+            closed=self._closed(data), along=applied.along(data.time, data.qpos, data.qvel),
+            exerted=applied.exerted(data.time, lambda link: self._forces.link_motion(link, data)),
+        )  # fmt: skip
+
+    def body_motion(self, link: int) -> BodyMotion:
+        """MuJoCo's spatial acceleration lacks w x v of the point; it counts from -gravity."""
+        data, body, at = self._data, self._tree.bodies[link], self._forces.link_motion(link, self._data)
+        alpha, arm = data.cacc[body, :3], at.position - self._pole(body, data)
+        acceleration = data.cacc[body, 3:] + self.gravity + cross(alpha, arm) + cross(at.angular, at.linear)
+        return BodyMotion(*at, alpha, acceleration)
 
     def _pole(self, bodies: int | NDArray[np.intp], data: mujoco.MjData) -> Real:
         """The points about which MuJoCo's spatial vectors of bodies are given."""
@@ -101,22 +96,6 @@ class MujocoObserver:
         """Loads of the couplings."""
         return self._rows(data)[3 * sum(len(closed.points) for closed in self._closures) :]
 
-    def _marker(self, at: Attachment, data: mujoco.MjData) -> MarkerSnapshot:
-        body = self._tree.bodies[at.link]
-        R = data.xmat[body].reshape(3, 3)
-        position = data.xpos[body] + R @ at.frame.position
-        arm = position - self._pole(body, data)
-        w, alpha = data.cvel[body, :3], data.cacc[body, :3]
-        v = data.cvel[body, 3:] + cross(w, arm)
-        # The spatial acceleration's linear part lacks w x v of the point; it counts from -gravity.
-        a = data.cacc[body, 3:] + self._gravity + cross(alpha, arm) + cross(w, v)
-        return MarkerSnapshot(
-            position=position,
-            quaternion=quaternion_of(R @ at.frame.rotation),
-            velocity=np.concatenate([w, v]),
-            acceleration=np.concatenate([alpha, a]),
-        )
-
     def _motion(self, data: mujoco.MjData) -> tuple[float, Real]:
         """Kinetic energy and momentum by summing bodies: MuJoCo's own energy would count what moves the drives."""
         model = self._tree.model
@@ -131,16 +110,16 @@ class MujocoObserver:
         kinetic += 0.5 * np.sum(self._armature * data.qvel**2)
         return float(kinetic), np.concatenate([np.sum(about_com + cross(data.xipos, p), axis=0), p.sum(axis=0)])
 
-    def _drives(self, data: mujoco.MjData, loads: dict[tuple[str, str], Real]) -> dict[str, Real]:
+    def _drives(self, data: mujoco.MjData, loads: Real) -> dict[str, Real]:
         """Load across the joint along the prescribed axis and on the armature, less what spring and damper give."""
         drives = []
         for slot in self._forces.driven:
-            load = loads[slot.link.kind, slot.link.joint]
+            load = loads[self._numbers[slot.body]]
             about_axis = shift_wrench(load, data.xpos[slot.body] - data.xanchor[slot.joint])
             half = by_motion(slot.freedom, about_axis[:3], about_axis[3:])
             freedom = slot.freedom
             passive = freedom.stiffness * (freedom.rest - data.qpos[slot.q]) - freedom.damping * data.qvel[slot.v]
-            along = self._forces.connections.along(data.time, data).values()
+            along = self._forces.loads.along(data.time, data.qpos, data.qvel).values()
             passive += sum(held.load for v, held in along if v == slot.v)
             for coupling, size in zip(self._couplings, self._held(data).tolist(), strict=True):
                 own = zip(coupling.slots, coupling.factors, strict=True)

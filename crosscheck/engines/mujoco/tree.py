@@ -19,7 +19,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.engines.conventions import quaternion_of, rotation_matrix
+from crosscheck.engines.conventions import quaternion_of
 from crosscheck.engines.links import (
     Attachment,
     Ball,
@@ -32,12 +32,13 @@ from crosscheck.engines.links import (
     is_bare_frame,
     radius_of_gyration,
 )
-from crosscheck.engines.rigid_tree import Slot, scene_start
+from crosscheck.engines.rigid_tree import Counting, Slot, scene_start
 from flexmb.scene.hinges import Closure
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
 ARMATURE = 1e20
+COUNTING = Counting(scalar_first=True, linear_first=True, outboard=False)
 LEAST_INERTIA = 1e-14
 
 
@@ -151,12 +152,7 @@ def build_tree(
 
 def initial_state(tree: MujocoTree) -> tuple[Real, Real]:
     """qpos and qvel at t = 0."""
-    return scene_start(tree.slots, (tree.model.nq, tree.model.nv), _inboard)
-
-
-def _inboard(flight: Floating) -> list[float]:
-    """The speeds of free flight, whose slides are in inboard axes."""
-    return [*(rotation_matrix(flight.quaternion) @ flight.velocity), *flight.angular_velocity]
+    return scene_start(tree.slots, (tree.model.nq, tree.model.nv), COUNTING)
 
 
 def _close(spec: mujoco.MjSpec, bodies: list[mujoco.MjsBody], closed: MujocoClosure, number: int) -> None:

@@ -12,25 +12,15 @@ from typing import NamedTuple
 import numpy as np
 import opensim
 
-from crosscheck.engines.connections import WORLD, Along, Exerted, Moving
-from crosscheck.engines.conventions import cross, quaternion_rate, shift_wrench
-from crosscheck.engines.links import Attachment, Floating
-from crosscheck.engines.opensim.tree import (
-    OpensimSlot,
-    OpensimTree,
-    angles,
-    initial_state,
-    outboard_rotation,
-    spatial,
-    vector,
-)
+from crosscheck.engines.conventions import cross, shift_wrench
+from crosscheck.engines.opensim.tree import OpensimSlot, OpensimTree, angles, outboard_rotation, spatial, vector
 from crosscheck.engines.rigid_tree import (
     FreeCoordinates,
     JointForces,
-    TreeConnectors,
+    TreeEquations,
+    TreeLoads,
     TreeState,
     placed_couplings,
-    placed_loads,
     places,
     scalars,
 )
@@ -50,25 +40,17 @@ class OpensimSolution(NamedTuple):
     power: float
 
 
-class OpensimDynamics:
+class OpensimDynamics(TreeEquations[OpensimSlot]):
     def __init__(self, tree: OpensimTree, scene: Scene) -> None:
         self.tree = tree
         self.forces = JointForces(tree.slots, tree.nv)
-        self.connectors = TreeConnectors(scene, tree.links, tree.slots)
+        self.loads = TreeLoads(scene, tree.links, tree.slots)
         self.couplings = placed_couplings(scene, tree.slots)
-        self.coordinates: FreeCoordinates[OpensimSlot] = FreeCoordinates(tree.slots, tree.nq, tree.nv)
-        self.driven = self.coordinates.driven
+        self.coordinates = FreeCoordinates(tree.slots, tree.nq, tree.nv)
         self._scalar_places = places([slot.place for slot in scalars(tree.slots)])
-        self._loads = placed_loads(scene, tree.links)
         self._matter = tree.model.getMatterSubsystem()
         single = np.eye(tree.nv)[self.coordinates.driven_v]
         self._rows = np.concatenate([single, *(each.row(tree.nv)[None] for each in self.couplings)])
-
-    def initial(self) -> Real:
-        return self.coordinates.packed(*initial_state(self.tree))
-
-    def state(self, t: float, y: Real) -> TreeState:
-        return self.coordinates.state(t, y)
 
     def solve(self, t: float, state: TreeState) -> OpensimSolution:
         """Accelerations and the loads of what is kept; the model's state has all of it, with the joints' loads."""
@@ -76,7 +58,7 @@ class OpensimDynamics:
         self._place(t, state.q, u)
         lost = self.forces.dampers_and_motors(t, u)
         tau, power = self.forces.springs(state.q) + lost, float(lost @ u)
-        for speed, each in self.connectors.along(t, state.q, u).values():
+        for speed, each in self.loads.along(t, state.q, u).values():
             tau[speed] += each.load
             power += each.power
         wrenches, working = self._wrenches(t)
@@ -89,42 +71,28 @@ class OpensimDynamics:
         power += working + float(drive @ u[self.coordinates.driven_v])
         return OpensimSolution(a, drive, coupling, power)
 
-    def rate(self, t: float, y: Real) -> Real:
-        """dy/dt."""
-        state = self.state(t, y)
+    def motion(self, t: float, state: TreeState) -> tuple[Real, float]:
         solution = self.solve(t, state)
-        coordinates = self.coordinates
-        qdot = np.empty(self.tree.nq)
-        qdot[coordinates.scalar_q] = state.v[coordinates.scalar_v]
-        for slot, place, own in coordinates.turning:  # rates of quaternions depend on their values as integrated
-            qdot[place] = quaternion_rate(y[own], state.v[slot.v : slot.v + 3])
-            if isinstance(slot.freedom, Floating):
-                qdot[slot.q : slot.q + 3] = outboard_rotation(slot, state.q) @ state.v[slot.v + 3 : slot.v + 6]
-        return coordinates.rate(qdot, self.outboard(state, solution.acceleration), solution.power)
+        return self.outboard(state, solution.acceleration), solution.power
 
     def outboard(self, state: TreeState, acceleration: Real) -> Real:
         """The rates (nv,) of the scene's speeds, of Simbody's: those of components in outboard axes."""
         vdot = acceleration.copy()
-        for slot, _, _ in self.coordinates.turning:
-            turning, R = slice(slot.v, slot.v + 3), outboard_rotation(slot, state.q)
+        for slot, _, _, turning, moving in self.coordinates.turning:
+            R = outboard_rotation(slot, state.q)
             vdot[turning] = R.T @ vdot[turning]
-            if isinstance(slot.freedom, Floating):
-                moving = slice(slot.v + 3, slot.v + 6)
+            if moving is not None:
                 vdot[moving] = R.T @ vdot[moving] - cross(state.v[turning], state.v[moving])
         return vdot
 
     def inverse_mass(self, state: TreeState) -> Real:
         """The inverse mass matrix (nv, nv) of the scene's speeds, in a state that was solved last."""
         axes = np.eye(self.tree.nv)  # Simbody's speeds of the scene's
-        for slot, _, _ in self.coordinates.turning:
+        for slot, *_ in self.coordinates.turning:
             R = outboard_rotation(slot, state.q)
             for first in range(slot.v, slot.v + slot.freedom.sizes[1], 3):
                 axes[first : first + 3, first : first + 3] = R
         return axes.T @ self._responses(axes.T)
-
-    def exerted(self, t: float) -> dict[str, Exerted]:
-        """What connectors between nodes do, by name, in the state of the model."""
-        return self.connectors.exerted(t, self._frame)
 
     def closing(self) -> dict[str, Real]:
         """[torque; force] (6,) of closures on body_b about frame B, World axes, in the state of the model."""
@@ -142,17 +110,10 @@ class OpensimDynamics:
             loads[closure.name] = -shift_wrench(spatial(on_bodies.get(place)), -arm)
         return loads
 
-    def along(self, t: float, state: TreeState) -> dict[str, tuple[int, Along]]:
-        """By name the speed that a connector along a hinge acts on, and what it does."""
-        return self.connectors.along(t, state.q, state.v)
-
-    def _frame(self, at: Attachment) -> Moving:
-        return (WORLD if at.link < 0 else self.tree.motion(at.link)).carrying(at.frame)
-
     def _speeds(self, state: TreeState) -> Real:
         """Simbody's speeds (nv,) of the scene's."""
         u = state.v.copy()
-        for slot, _, _ in self.coordinates.turning:
+        for slot, *_ in self.coordinates.turning:
             R, (_, count) = outboard_rotation(slot, state.q), slot.freedom.sizes
             own = slice(slot.v, slot.v + count)
             u[own] = (u[own].reshape(-1, 3) @ R.T).ravel()
@@ -163,9 +124,9 @@ class OpensimDynamics:
         model, state, coordinates = self.tree.model, self.tree.state, self.coordinates
         own = np.zeros(state.getNQ())
         own[self._scalar_places] = q[coordinates.scalar_q]
-        for slot, _, _ in coordinates.turning:
+        for slot, *_, moving in coordinates.turning:
             own[slot.place : slot.place + 3] = angles(outboard_rotation(slot, q))
-            if isinstance(slot.freedom, Floating):
+            if moving is not None:
                 own[slot.place + 3 : slot.place + 6] = q[slot.q : slot.q + 3]
         state.setTime(t)
         state.setQ(vector(own))
@@ -209,16 +170,5 @@ class OpensimDynamics:
 
     def _wrenches(self, t: float) -> tuple[Real, float]:
         """Of loads at nodes and connectors between nodes on the links `loaded` (n, 6), and their power (W)."""
-        total, power = {link: np.zeros(6) for link in self.tree.loaded}, 0.0
-        for link, load in self._loads:
-            at, none = self.tree.motion(link), np.zeros(3)
-            given = load.in_world(t, at.rotation)
-            about_point = np.concatenate([none, given] if load.is_force else [given, none])
-            wrench = shift_wrench(about_point, at.rotation @ load.point)
-            total[link] += wrench
-            power += float(wrench[:3] @ at.angular + wrench[3:] @ at.linear)
-        exerted = self.exerted(t) if self.connectors.between else {}
-        for end, wrench in self.connectors.loads(exerted):
-            total[end.link] += shift_wrench(wrench, self.tree.motion(end.link).rotation @ end.frame.position)
-        power += sum(each.power for each in exerted.values())
-        return np.array(list(total.values())).reshape(-1, 6), power
+        wrenches, power = self.loads.wrenches(t, self.tree.motion)
+        return np.array([wrenches[link] for link in self.tree.loaded]).reshape(-1, 6), power

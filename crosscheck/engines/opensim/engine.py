@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from importlib.metadata import version
+from collections.abc import Iterator
 
 from crosscheck.engines.connections import KNOWN
-from crosscheck.engines.contract import Effort, Model
-from crosscheck.engines.links import Link, links, obstacle
-from crosscheck.engines.peer import PeerEngine, needed
+from crosscheck.engines.contract import Model
+from crosscheck.engines.links import links
+from crosscheck.engines.peer import Library, PeerEngine, TreeCapabilities
 from crosscheck.engines.scipy_loop import RTOL_LADDER, ScipyModel
 from flexmb.scene.hinges import ClosureKind
 from flexmb.scene.schema import Scene
@@ -30,18 +29,14 @@ class OpensimEngine(PeerEngine):
         "DOP853, also in Python: on small scenes much of the time is Python's. Simbody's own integrators see forces "
         "through classes of C++ alone. No contacts. Outputs are computed after the timed solve."
     )
+    library = Library("OpenSim", "opensim", "opensim")
+    capabilities = TreeCapabilities(CLOSED_BY, KNOWN, screws=True, couplings=True)
+    ladder = RTOL_LADDER
 
-    def version(self) -> str:
-        with needed("OpenSim", "opensim"):
-            import opensim  # noqa: F401
-        return version("opensim")
-
-    def obstacle(self, scene: Scene) -> str:
-        reason = obstacle(scene, "OpenSim", CLOSED_BY, KNOWN, screws=True, couplings=True)
-        return reason or _inertia_obstacle(links(scene))
-
-    def efforts(self, scene: Scene) -> tuple[Effort, ...]:
-        return RTOL_LADDER
+    def refusals(self, scene: Scene) -> Iterator[str]:
+        for link in links(scene):
+            if link.inertia.mass < MASSLESS and link.inertia.inertia.any():
+                yield f'OpenSim drops the inertia of a link without mass ("{link.name}"): give it some mass'
 
     def model(self, scene: Scene) -> Model:
         from crosscheck.engines.opensim.dynamics import OpensimDynamics
@@ -51,11 +46,3 @@ class OpensimEngine(PeerEngine):
 
         dynamics = OpensimDynamics(build_tree(scene, links(scene)), scene)
         return ScipyModel(scene, dynamics, OpensimObserver(dynamics, scene), linearised(dynamics, scene))
-
-
-def _inertia_obstacle(chain: Sequence[Link]) -> str:
-    """Why OpenSim cannot have the inertia of a link, "" if it can have all."""
-    for link in chain:
-        if link.inertia.mass < MASSLESS and link.inertia.inertia.any():
-            return f'OpenSim drops the inertia of a link without mass ("{link.name}"): give it some mass'
-    return ""

@@ -13,7 +13,6 @@ from crosscheck.engines.linear.coordinates import obstacle
 from crosscheck.engines.linear.differences import differentiated
 from crosscheck.engines.linear.matrices import EPS, Errors, LinearMatrices, norm, quaternion_transport, rounding
 from crosscheck.engines.linear.slots import slot_places
-from crosscheck.engines.links import Floating
 from crosscheck.engines.opensim.dynamics import OpensimDynamics
 from crosscheck.engines.opensim.tree import outboard_rotation
 from crosscheck.engines.rigid_tree import TreeState
@@ -67,9 +66,9 @@ class OpensimLinear:
         q, moved = state.q.copy(), np.zeros(len(state.v))
         moved[self._places] = xi
         q[coordinates.scalar_q] += moved[coordinates.scalar_v]
-        for slot, place, _ in coordinates.turning:
-            if isinstance(slot.freedom, Floating):
-                q[slot.q : slot.q + 3] += outboard_rotation(slot, state.q) @ moved[slot.v + 3 : slot.v + 6]
-            q[place] += quaternion_rate(q[place], moved[slot.v : slot.v + 3])
+        for slot, place, _, turning, moving in coordinates.turning:
+            if moving is not None:
+                q[slot.q : slot.q + 3] += outboard_rotation(slot, state.q) @ moved[moving]
+            q[place] += quaternion_rate(q[place], moved[turning])
             q[place] /= norm(q[place])
         return state._replace(q=q)

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from crosscheck.engines.connections import Moving, connections
 from crosscheck.engines.conventions import IDENTITY_FRAME, Frame, axes_with, rotation_matrix
-from crosscheck.engines.links import Attachment, Ball, Floating, Freedom, Link, Scalar, closed_frames
-from crosscheck.engines.rigid_tree import Slot, placed_loads, quaternion_place, scene_start
+from crosscheck.engines.links import Attachment, Ball, Floating, Freedom, Link, Scalar, attachment, closed_frames
+from crosscheck.engines.rigid_tree import Slot, quaternion_place
 from flexmb.scene.schema import Closure, Scene
 from flexmb.surrogate.lumping import Inertia
 from flexmb.typing import Real
@@ -136,7 +136,7 @@ def build_tree(scene: Scene, chain: tuple[Link, ...]) -> OpensimTree:
     for _, _, _, joint in made:
         _actuate(model, joint)
     ends = {at.link for each in connections(scene, chain) for at in (each.a, each.b) if at.link >= 0}
-    loaded = tuple(sorted(ends | {link for link, _ in placed_loads(scene, chain)}))
+    loaded = tuple(sorted(ends | {attachment(scene, chain, load).link for load in scene.loads}))
     for link in loaded:
         _burden(model, bodies[link])
     constraints = [_close(model, bodies, closure, closed_frames(scene, chain, closure)) for closure in scene.closures]
@@ -149,11 +149,6 @@ def build_tree(scene: Scene, chain: tuple[Link, ...]) -> OpensimTree:
     return OpensimTree(
         model, state, chain, tuple(bodies), tuple(joints), slots, _closures(scene, chain), nq, actuated, loaded
     )
-
-
-def initial_state(tree: OpensimTree) -> tuple[Real, Real]:
-    """The scene's coordinates (nq,) and speeds (nv,) at t = 0, those of free joints in outboard axes."""
-    return scene_start(tree.slots, (tree.nq, tree.nv), lambda flight: [*flight.angular_velocity, *flight.velocity])
 
 
 def _sizes(freedom: Freedom) -> tuple[int, int]:

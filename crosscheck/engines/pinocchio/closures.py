@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import pinocchio as pin
 
 from crosscheck.engines.links import closed_frames
-from crosscheck.engines.pinocchio.forces import ClosedLoad, on_joints
+from crosscheck.engines.pinocchio.forces import ClosedLoad, on_both_sides
 from crosscheck.engines.pinocchio.tree import PinocchioTree, placement
 from flexmb.scene.schema import Closure, Scene
 from flexmb.typing import Real
@@ -39,10 +39,10 @@ class PinocchioClosures:
             self._constraints.append(pin.RigidConstraintModel(kind, tree.model, a, at_a, b, at_b, frame))
             self._sides.append((a, b))
         self._data = tree.model.createData()
-        self._found = pin.StdVec_RigidConstraintData()
+        self._solved = pin.StdVec_RigidConstraintData()
         for constraint in self._constraints:
-            self._found.append(constraint.createData())
-        pin.initConstraintDynamics(tree.model, self._data, self._constraints, self._found)
+            self._solved.append(constraint.createData())
+        pin.initConstraintDynamics(tree.model, self._data, self._constraints, self._solved)
         self._settings = pin.ProximalSettings(*_PROXIMAL)
 
     def __bool__(self) -> bool:
@@ -51,7 +51,7 @@ class PinocchioClosures:
     def solve(self, q: Real, v: Real, tau: Real) -> Real:
         """Accelerations (nv,) that keep the closures closed under generalised forces tau (nv,)."""
         accelerations = pin.constraintDynamics(
-            self._model, self._data, q, v, tau, self._constraints, self._found, self._settings
+            self._model, self._data, q, v, tau, self._constraints, self._solved, self._settings
         )
         return np.array(accelerations)
 
@@ -59,15 +59,15 @@ class PinocchioClosures:
         """[torque; force] (6,) on body_b about frame B, World axes, of the state solved last."""
         return {name: load.wrench for name, load in zip(self._names, self._closed(), strict=True)}
 
-    def on_joints(self) -> pin.StdVec_Force:
-        """The same as wrenches on both sides' joints, in joint axes about the joint origin."""
-        return on_joints(self._model, self._data, self._closed())
+    def on_joints(self) -> Iterator[tuple[int, Real]]:
+        """The same on both sides' joints about their origins."""
+        return on_both_sides(self._data, self._closed())
 
     def _closed(self) -> list[ClosedLoad]:
         """By closure; Pinocchio's force is that on A, in its axes."""
         loads = []
-        for each, sides in zip(self._found, self._sides, strict=True):
-            R = each.oMc1.rotation
-            wrench = -np.concatenate([R @ each.contact_force.angular, R @ each.contact_force.linear])
-            loads.append(ClosedLoad(wrench, each.oMc2.translation.copy(), sides))
+        for solved, sides in zip(self._solved, self._sides, strict=True):
+            R, force = solved.oMc1.rotation, solved.contact_force
+            wrench = -np.concatenate([R @ force.angular, R @ force.linear])
+            loads.append(ClosedLoad(wrench, solved.oMc2.translation.copy(), sides))
         return loads

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import get_args
 
 from crosscheck.engines.connections import KNOWN
-from crosscheck.engines.contract import Effort, EngineMissing, Model
-from crosscheck.engines.hybrid.refusals import refusal
-from crosscheck.engines.links import obstacle
-from crosscheck.engines.peer import PeerEngine
+from crosscheck.engines.contract import Model
+from crosscheck.engines.peer import Library, PeerEngine, TreeCapabilities
 from crosscheck.engines.scipy_loop import RTOL_LADDER
 from flexmb.scene.hinges import ClosureKind
 from flexmb.scene.schema import Scene
@@ -30,22 +29,13 @@ class PinocchioEngine(PeerEngine):
         "time is SciPy's and Python's; events and controllers are in a loop in Python around it. No contacts. Outputs "
         "are computed after the timed solve."
     )
+    library = Library("Pinocchio", "pinocchio", "pin")
+    capabilities = TreeCapabilities(get_args(ClosureKind), KNOWN, screws=True, couplings=True, armatures=True)
+    ladder = RTOL_LADDER
 
-    def version(self) -> str:
-        try:
-            import pinocchio
-        except ImportError as error:
-            raise EngineMissing("Pinocchio is not installed: pip install pin") from error
-        return pinocchio.__version__
-
-    def obstacle(self, scene: Scene) -> str:
+    def refusals(self, scene: Scene) -> Iterator[str]:
         if len(scene.hinges) > MOST_JOINTS:
-            return f"{len(scene.hinges)} hinges are too many: {WHY_NOT_MORE}"
-        offers = {"screws": True, "couplings": True, "armatures": True}
-        return obstacle(scene, "Pinocchio", get_args(ClosureKind), KNOWN, **offers) or refusal(scene)
-
-    def efforts(self, scene: Scene) -> tuple[Effort, ...]:
-        return RTOL_LADDER
+            yield f"{len(scene.hinges)} hinges are too many: {WHY_NOT_MORE}"
 
     def model(self, scene: Scene) -> Model:
         from crosscheck.engines.pinocchio.model import compiled

@@ -23,7 +23,8 @@ from crosscheck.engines.linear.matrices import LinearMatrices, exact
 from crosscheck.engines.linear.slots import slot_places
 from crosscheck.engines.links import Ball, Floating, Scalar
 from crosscheck.engines.pinocchio.dynamics import Acting, Dynamics
-from crosscheck.engines.rigid_tree import TreeState
+from crosscheck.engines.pinocchio.forces import inverse_mass_matrix, mass_matrix
+from crosscheck.engines.rigid_tree import PointLoad, TreeState
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -56,8 +57,7 @@ class PinocchioLinear:
         """By forward dynamics: derivatives by displacements, speeds and forces."""
         extra = () if acting.wrenches is None else (acting.wrenches,)
         pin.computeABADerivatives(self._model, self._data, state.q, state.v, acting.tau, *extra)
-        upper = np.triu(self._data.Minv)  # all that Pinocchio fills
-        inverse = upper + np.triu(upper, 1).T
+        inverse = inverse_mass_matrix(self._data)
         by_q = self._data.ddq_dq + inverse @ self._pull(state, acting)
         by_v = self._data.ddq_dv + inverse @ self._drag(state)
         square = np.ix_(self._places, self._places)
@@ -68,8 +68,7 @@ class PinocchioLinear:
         extra = () if acting.wrenches is None else (acting.wrenches,)
         by_q, by_v, _ = pin.computeRNEADerivatives(self._model, self._data, state.q, state.v, a, *extra)
         by_q, by_v = by_q.copy(), by_v.copy()
-        M = pin.crba(self._model, self._data, state.q)
-        M = np.triu(M) + np.triu(M, 1).T
+        M = mass_matrix(self._model, self._data, state.q)
         square = np.ix_(self._places, self._places)
         inverse = np.linalg.inv(M[square])
         pull, drag = self._pull(state, acting)[square], self._drag(state)[square]
@@ -91,9 +90,11 @@ class PinocchioLinear:
                     assert_never(slot.freedom)
         if acting.wrenches is not None:
             pin.computeJointJacobians(self._model, self._data, state.q)
-            for joint, wrench in self._dynamics.loads.fixed_in_world(acting.t, self._data):
-                J = pin.getJointJacobian(self._model, self._data, joint, pin.ReferenceFrame.LOCAL)
-                stiffness += J.T @ wrench @ J[3:]
+            for link, load in self._dynamics.loads.at_nodes:
+                if load.fixed_in_world:
+                    joint = self._dynamics.tree.joints[link]
+                    J = pin.getJointJacobian(self._model, self._data, joint, pin.ReferenceFrame.LOCAL)
+                    stiffness += J.T @ _turned(load, acting.t, self._data.oMi[joint].rotation) @ J[3:]
         return stiffness
 
     def _drag(self, state: TreeState) -> Real:
@@ -110,3 +111,10 @@ class PinocchioLinear:
                 case _:
                     assert_never(slot.freedom)
         return np.diag(forces)
+
+
+def _turned(load: PointLoad, t: float, R: Real) -> Real:
+    """d [force; torque]/d xi_w (6,3) of a load f of World, in joint axes that turn by xi_w: they see it turn back, and
+    df = f x xi_w."""
+    force = pin.skew(R.T @ load.vector(t))
+    return np.vstack([force, pin.skew(load.point) @ force]) if load.is_force else np.vstack([np.zeros((3, 3)), force])

@@ -6,7 +6,7 @@ Pinocchio's own constrained dynamics closes loops by welds and ball joints of tr
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -14,9 +14,9 @@ import pinocchio as pin
 
 from crosscheck.engines.conventions import Frame, axes_with, cross
 from crosscheck.engines.links import closed_frames
-from crosscheck.engines.pinocchio.forces import ClosedLoad, on_joints
+from crosscheck.engines.pinocchio.forces import ClosedLoad, body_motion, mass_matrix, on_both_sides
 from crosscheck.engines.pinocchio.tree import PinocchioTree
-from crosscheck.engines.rigid_tree import TreeState, placed_couplings
+from crosscheck.engines.rigid_tree import BodyMotion, TreeState, placed_couplings
 from flexmb.scene.hinges import WITH_AXIS, Closure, ClosureKind
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
@@ -46,17 +46,6 @@ class _End(NamedTuple):
     frame: Frame
 
 
-class _Side(NamedTuple):
-    """A side at a state, World axes: position (3,) and axes (3,3), and velocities and accelerations (3,) of both."""
-
-    position: Real
-    axes: Real
-    omega: Real
-    velocity: Real
-    alpha: Real
-    acceleration: Real
-
-
 class PinocchioRows:
     """Closures and the couplings of a scene on its tree. `efforts` leaves their loads for `loads` and `on_joints`."""
 
@@ -82,8 +71,7 @@ class PinocchioRows:
         columns scaled to length one are U S V', the loads are f = -V S^-2 V' (J a + dJ/dt v) but for these scales;
         where rows are redundant, they are the least such ones.
         """
-        M = pin.crba(self._model, self._data, state.q)
-        M = np.triu(M) + np.triu(M, 1).T
+        M = mass_matrix(self._model, self._data, state.q)
         J, opening, directions = self._rows(state, accelerations)
         W = np.linalg.solve(np.linalg.cholesky(M[np.ix_(self._free, self._free)]), J[:, self._free].T)
         lengths = np.linalg.norm(W, axis=0)
@@ -106,11 +94,10 @@ class PinocchioRows:
         }
         return of_couplings | {name: load for name, (load, _) in self._wrench.items()}
 
-    def on_joints(self) -> pin.StdVec_Force:
-        """Those of closures as wrenches on both sides' joints, in joint axes about the joint origin."""
-        closed = ((*found, self._closures[name][1]) for name, found in self._wrench.items())
-        loads = (ClosedLoad(load, place, (a.joint, b.joint)) for load, place, (a, b) in closed)
-        return on_joints(self._model, self._data, loads)
+    def on_joints(self) -> Iterator[tuple[int, Real]]:
+        """Those of closures on both sides' joints about their origins, World axes."""
+        closed = ((*load_at, self._closures[name][1]) for name, load_at in self._wrench.items())
+        return on_both_sides(self._data, (ClosedLoad(load, at, (a.joint, b.joint)) for load, at, (a, b) in closed))
 
     def _rows(self, state: TreeState, accelerations: Real) -> tuple[Real, Real, dict[str, tuple[Real, Real]]]:
         """J (G, nv) of couplings, then closures, their accelerations (G,), and for each closure [torque; force] (6, n)
@@ -120,25 +107,12 @@ class PinocchioRows:
             pin.forwardKinematics(self._model, self._data, state.q, state.v, accelerations)
             pin.computeJointJacobians(self._model, self._data)
         for name, (kind, ends) in self._closures.items():
-            a, b = (self._side(end) for end in ends)
+            a, b = (body_motion(self._data, end.joint).carrying(end.frame) for end in ends)
             along, rates = _kept(kind, a, b)
             directions[name] = along, b.position
             J.append(along.T @ (self._reach(ends[1].joint, b.position) - self._reach(ends[0].joint, b.position)))
             opening.append(rates)
         return np.concatenate(J), np.concatenate(opening), directions
-
-    def _side(self, end: _End) -> _Side:
-        if end.joint == 0:
-            still = np.zeros(3)
-            return _Side(end.frame.position, end.frame.rotation, still, still, still, still)
-        pose, speed, rate = self._data.oMi[end.joint], self._data.v[end.joint], self._data.a[end.joint]
-        R = pose.rotation
-        omega, alpha, arm = R @ speed.angular, R @ rate.angular, R @ end.frame.position
-        of_point = R @ (rate.linear + cross(speed.angular, speed.linear))
-        return _Side(
-            pose.translation + arm, R @ end.frame.rotation, omega, R @ speed.linear + cross(omega, arm), alpha,
-            of_point + cross(alpha, arm) + cross(omega, cross(omega, arm)),
-        )  # fmt: skip
 
     def _reach(self, joint: int, point: Real) -> Real:
         """(6, nv) [angular; linear] velocity in World axes of the body at a joint, there where `point` is."""
@@ -159,19 +133,19 @@ def _ends(tree: PinocchioTree, scene: Scene, closure: Closure) -> tuple[_End, _E
     return a, b
 
 
-def _kept(kind: ClosureKind, a: _Side, b: _Side) -> tuple[Real, Real]:
+def _kept(kind: ClosureKind, a: BodyMotion, b: BodyMotion) -> tuple[Real, Real]:
     """[torque; force] (6, n) on B of unit loads of the rows, and the second derivatives (n,) of what they keep zero."""
     pairs, steps = _KEPT[kind]
     along, rates = np.zeros((6, len(pairs) + len(steps))), []
-    turning, alpha = b.omega - a.omega, b.alpha - a.alpha
+    turning, alpha = b.angular - a.angular, b.alpha - a.alpha
     for k, (of_a, of_b) in enumerate(pairs):
-        x, y = a.axes[:, of_a], b.axes[:, of_b]
+        x, y = a.rotation[:, of_a], b.rotation[:, of_b]
         along[:3, k] = normal = cross(y, x)
-        rates.append(alpha @ normal + turning @ (cross(cross(b.omega, y), x) + cross(y, cross(a.omega, x))))
-    gap, moving = b.position - a.position, b.velocity - a.velocity
+        rates.append(alpha @ normal + turning @ (cross(cross(b.angular, y), x) + cross(y, cross(a.angular, x))))
+    gap, moving = b.position - a.position, b.linear - a.linear
     for k, axis in enumerate(steps, len(pairs)):
-        n = a.axes[:, axis]
-        along[3:, k], turned = n, cross(a.omega, n)
-        bent = cross(a.alpha, n) + cross(a.omega, turned)
+        n = a.rotation[:, axis]
+        along[3:, k], turned = n, cross(a.angular, n)
+        bent = cross(a.alpha, n) + cross(a.angular, turned)
         rates.append(n @ (b.acceleration - a.acceleration) + 2.0 * turned @ moving + bent @ gap)
     return along, np.array(rates)

@@ -12,12 +12,13 @@ from typing import assert_never
 import numpy as np
 import pinocchio as pin
 
-from crosscheck.engines.conventions import Frame, scalar_last
+from crosscheck.engines.conventions import Frame
 from crosscheck.engines.links import Ball, Floating, Freedom, Link, Scalar
-from crosscheck.engines.rigid_tree import Slot, scene_start
+from crosscheck.engines.rigid_tree import Counting, Slot, scene_start
 from flexmb.scene.functions import Constant
 from flexmb.typing import Real
 
+COUNTING = Counting(scalar_first=False, linear_first=True, outboard=True)
 _HELD = Scalar("turn", np.array([0.0, 0.0, 1.0]), *(0.0,) * 7, None, Constant(value=0.0))
 
 
@@ -70,8 +71,7 @@ def build_tree(links: tuple[Link, ...], gravity: Real) -> PinocchioTree:
 
 def initial_state(tree: PinocchioTree) -> tuple[Real, Real]:
     """Coordinates (nq,) and speeds (nv,) at t = 0."""
-    sizes = tree.model.nq, tree.model.nv
-    return scene_start(tree.slots, sizes, lambda flight: [*flight.velocity, *flight.angular_velocity], scalar_last)
+    return scene_start(tree.slots, (tree.model.nq, tree.model.nv), COUNTING)
 
 
 def _joint(freedom: Freedom) -> pin.JointModel:

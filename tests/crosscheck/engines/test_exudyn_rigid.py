@@ -2,6 +2,7 @@
 
 import builtins
 import sys
+from importlib.metadata import PackageNotFoundError
 
 import numpy as np
 import pytest
@@ -154,11 +155,11 @@ def test_a_missing_library_is_named_with_its_remedy(monkeypatch):
     library.load.cache_clear()
     with pytest.raises(EngineMissing, match="pip install exudyn$"):
         library.load()
-    monkeypatch.setattr(library, "installed_version", _not_installed)
+    monkeypatch.setattr("crosscheck.engines.peer.version", _not_installed)
     for engine in (ExudynEngine(), ExudynBeamEngine()):
         with pytest.raises(EngineMissing, match="pip install exudyn$"):
             engine.version()
 
 
 def _not_installed(name: str) -> str:
-    raise library.PackageNotFoundError(name)
+    raise PackageNotFoundError(name)
