@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from crosscheck.engines.answers import checked_ladder, checked_model, checked_run, checked_support, checked_version
-from crosscheck.engines.contract import Effort, Engine, Model, Run, Snapshot, Support, Trajectory
-from crosscheck.engines.steps import USUAL_S
+from crosscheck.engines.contract import USUAL_S, Effort, Engine, Model, Run, Snapshot, Support, Trajectory
 from flexmb.scene.schema import Scene, UserLaw
 
 LATER = ("connectors", "couplings", "controllers", "events")

@@ -17,6 +17,7 @@ Array = Real  # the name that engines outside this package import
 Status = Literal["finished", "diverged", "failed"]
 Precision = Literal["double", "single"]
 UNIT_ROUNDOFF: dict[Precision, float] = {"double": 2.0**-53, "single": 2.0**-24}
+USUAL_S = 10.0  # assumed duration of a run where it is unknown
 ENERGIES = ("kinetic", "strain", "spring", "gravity")  # the kinds of energy that an engine may give
 
 

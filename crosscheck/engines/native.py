@@ -21,6 +21,7 @@ from msgspec import structs
 from crosscheck.engines.contract import (
     LINEAR,
     OUTPUTS,
+    USUAL_S,
     Effort,
     MarkerPath,
     MarkerSnapshot,
@@ -34,7 +35,7 @@ from crosscheck.engines.extremes import ROWS, has_extremes
 from crosscheck.engines.native_linear import linear_outputs
 from crosscheck.engines.openness import LOAD_PARTS, Openness
 from crosscheck.engines.pace import fastest_mode, pace
-from crosscheck.engines.steps import USUAL_S, ladder
+from crosscheck.engines.steps import ladder
 from crosscheck.engines.trajectories import first_samples
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.integrate.integrator import Method

@@ -2,22 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from importlib.metadata import version
 from typing import NamedTuple
 
-import numpy as np
-
-from crosscheck.engines.contract import Effort, EngineMissing, Model, Support
-from crosscheck.engines.hybrid.refusals import refusal
-from crosscheck.engines.links import Link, obstacle
-from crosscheck.engines.steps import USUAL_S
-from flexmb.scene.connectors import Connector
+from crosscheck.engines.contract import USUAL_S, Effort, EngineMissing, Model, Support
 from flexmb.scene.schema import Scene
-
-ROUND_OFF = 1e-12  # of the largest principal moment: by so much a disc's moments may miss the triangle inequality
 
 
 class Library(NamedTuple):
@@ -28,30 +20,15 @@ class Library(NamedTuple):
     distribution: str
 
 
-class TreeCapabilities(NamedTuple):
-    """What an adapter of a code of rigid trees takes: types of closures and connectors, and what joints may have.
-
-    `loops`: why it closes none, where there is more to say than that.
-    """
-
-    closed_by: tuple[str, ...] = ()
-    connected_by: tuple[type[Connector], ...] = ()
-    screws: bool = False
-    couplings: bool = False
-    armatures: bool = False
-    loops: str = ""
-
-
 class PeerEngine:
     """Base of the adapters, which import their library only in `version` and `model`.
 
-    Each declares its `library` and, where it is a code of rigid trees, `capabilities`; `refusals` are what it adds.
+    Each declares its `library` and its `ladder`, and yields its `refusals` and `approximations`.
     """
 
     name: str
     takes: tuple[str, ...] = ()
     library: Library
-    capabilities: TreeCapabilities | None = None
     ladder: tuple[Effort, ...] = ()
 
     def version(self) -> str:
@@ -61,7 +38,7 @@ class PeerEngine:
             return version(self.library.distribution)
 
     def refusals(self, scene: Scene) -> Iterator[str]:
-        """Why the engine cannot represent the scene, beside what its capabilities say; one thing after the other."""
+        """Why the engine cannot represent the scene, one thing after the other."""
         yield from ()
 
     def approximations(self, scene: Scene) -> Iterator[str]:
@@ -74,7 +51,7 @@ class PeerEngine:
 
     def obstacle(self, scene: Scene) -> str:
         """Why the engine cannot represent the scene, "" if it can."""
-        return next(filter(None, self._obstacles(scene)), "")
+        return next(filter(None, self.refusals(scene)), "")
 
     def supports(self, scene: Scene) -> Support:
         """ "no" with the first reason, else "surrogate" with all that is approximated, else "exact"."""
@@ -95,16 +72,6 @@ class PeerEngine:
             raise ValueError(f'scene "{scene.name}": {reason}')
         return self.model(scene)
 
-    def _obstacles(self, scene: Scene) -> Iterator[str]:
-        takes = self.capabilities
-        if takes is not None:
-            if takes.loops and scene.closures:
-                yield f'closure "{scene.closures[0].name}": {self.library.words} {takes.loops}'
-            yield obstacle(scene, self.library.words, *takes[:-1])
-        if "events" in self.takes:
-            yield refusal(scene)
-        yield from self.refusals(scene)
-
 
 @contextmanager
 def needed(library: str, distribution: str) -> Iterator[None]:
@@ -113,13 +80,3 @@ def needed(library: str, distribution: str) -> Iterator[None]:
         yield
     except ImportError as error:
         raise EngineMissing(f"{library} is not installed: pip install {distribution}") from error
-
-
-def inertia_refusals(links: Iterable[Link], engine: str) -> Iterator[str]:
-    """Why an engine that needs mass and a possible inertia on every link refuses some."""
-    for link in links:
-        if link.inertia.mass <= 0.0:
-            yield f'{engine} needs a positive mass on every link ("{link.name}")'
-        a, b, c = np.linalg.eigvalsh(link.inertia.inertia)
-        if a < -ROUND_OFF * c or a + b < c * (1.0 - ROUND_OFF):
-            yield f'{engine} refuses the inertia of "{link.name}": principal moments {a:g}, {b:g}, {c:g} kg m^2'

@@ -6,14 +6,13 @@ from itertools import pairwise
 from math import ceil, floor, log2, log10
 from typing import TYPE_CHECKING
 
+from crosscheck.engines.contract import USUAL_S as USUAL_S  # the name that engines outside this package import
 from crosscheck.engines.contract import Effort
 
 if TYPE_CHECKING:  # it loads scipy, which a worker does without
     from crosscheck.engines.pace import Pace
     from flexmb.typing import Real
 
-USUAL_S = 10.0
-"""Assumed duration (s) where the run's is unknown."""
 LEAST, MOST = 400, 1_000_000
 """Bounds of the number of steps: at the coarsest effort at least, at the finest at most. A run whose fastest motion
 needs more steps needs efforts of its own and an implicit method."""

@@ -6,12 +6,13 @@ from collections.abc import Iterator
 
 from crosscheck.engines.basilisk.craft import NoCraft, craft_of
 from crosscheck.engines.contract import Model
-from crosscheck.engines.peer import Library, PeerEngine, TreeCapabilities
+from crosscheck.engines.peer import Library
 from crosscheck.engines.scipy_loop import RTOL_LADDER, ScipyModel
+from crosscheck.engines.tree_engine import TreeCapabilities, TreeEngine
 from flexmb.scene.schema import Scene
 
 
-class BasiliskEngine(PeerEngine):
+class BasiliskEngine(TreeEngine):
     """One free hub with balanced wheels, and serial chains of hinged or of sliding parts on it."""
 
     name = "basilisk"
@@ -26,7 +27,7 @@ class BasiliskEngine(PeerEngine):
     capabilities = TreeCapabilities()
     ladder = RTOL_LADDER
 
-    def refusals(self, scene: Scene) -> Iterator[str]:
+    def own_refusals(self, scene: Scene) -> Iterator[str]:
         try:
             craft_of(scene)
         except NoCraft as error:

@@ -11,7 +11,7 @@ from crosscheck.engines.basilisk.dynamics import CraftDynamics, CraftSolution, C
 from crosscheck.engines.contract import Snapshot
 from crosscheck.engines.conventions import axis_rotation, cross, rotation_matrix
 from crosscheck.engines.links import by_motion
-from crosscheck.engines.rigid_tree import BodyMotion, Energies, TreeObserver
+from crosscheck.engines.tree_observer import BodyMotion, Energies, TreeObserver
 from flexmb.scene.schema import Scene
 
 

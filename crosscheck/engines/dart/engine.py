@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from crosscheck.engines.contract import Model
 from crosscheck.engines.links import links
-from crosscheck.engines.peer import Library, PeerEngine, TreeCapabilities
+from crosscheck.engines.peer import Library
 from crosscheck.engines.scipy_loop import RTOL_LADDER, ScipyModel
+from crosscheck.engines.tree_engine import TreeCapabilities, TreeEngine
 from flexmb.scene.schema import Scene
 
 
-class DartEngine(PeerEngine):
+class DartEngine(TreeEngine):
     """Rigid trees, exact: DART's forward dynamics, hybrid where coordinates are prescribed."""
 
     name = "dart"

@@ -7,7 +7,8 @@ import numpy as np
 from crosscheck.engines.contract import Snapshot
 from crosscheck.engines.conventions import cross, rotate_spatial
 from crosscheck.engines.dart.dynamics import DartDynamics
-from crosscheck.engines.rigid_tree import BodyMotion, Energies, TreeObserver, TreeState, by_joint
+from crosscheck.engines.rigid_tree import TreeState, by_joint
+from crosscheck.engines.tree_observer import BodyMotion, Energies, TreeObserver
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 

@@ -7,11 +7,12 @@ from collections.abc import Iterator
 from crosscheck.engines.connections import KNOWN
 from crosscheck.engines.contract import Effort, Model
 from crosscheck.engines.links import links
-from crosscheck.engines.peer import Library, PeerEngine, TreeCapabilities, inertia_refusals
+from crosscheck.engines.peer import Library
+from crosscheck.engines.tree_engine import TreeCapabilities, TreeEngine, inertia_refusals
 from flexmb.scene.schema import Scene
 
 
-class DrakeEngine(PeerEngine):
+class DrakeEngine(TreeEngine):
     """Rigid trees in continuous time, exact but for the artifice of prescribed coordinates (see `drake.tree`)."""
 
     name = "drake"
@@ -26,7 +27,7 @@ class DrakeEngine(PeerEngine):
     # Accuracies bound the absolute error of one step; that of a run is about a thousand times as large.
     ladder = tuple(Effort("tolerance", accuracy, "runge_kutta5") for accuracy in (1e-8, 1e-10, 1e-12, 1e-13))
 
-    def refusals(self, scene: Scene) -> Iterator[str]:
+    def own_refusals(self, scene: Scene) -> Iterator[str]:
         yield from inertia_refusals(links(scene), "Drake")
 
     def model(self, scene: Scene) -> Model:

@@ -10,7 +10,8 @@ from pydrake.multibody.tree import MultibodyForces
 from crosscheck.engines.contract import Snapshot
 from crosscheck.engines.drake.actions import DrakeLoads, Drives, JointActions
 from crosscheck.engines.drake.tree import DrakeState, DrakeTree, place
-from crosscheck.engines.rigid_tree import BodyMotion, Energies, TreeLoads, TreeObserver, by_joint
+from crosscheck.engines.rigid_tree import TreeLoads, by_joint
+from crosscheck.engines.tree_observer import BodyMotion, Energies, TreeObserver
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 

@@ -9,8 +9,9 @@ from crosscheck.engines.contract import Effort, Model
 from crosscheck.engines.hybrid.refusals import is_hybrid
 from crosscheck.engines.links import is_bare_frame, links
 from crosscheck.engines.pace import pace
-from crosscheck.engines.peer import Library, PeerEngine, TreeCapabilities, inertia_refusals
+from crosscheck.engines.peer import Library
 from crosscheck.engines.steps import ladder
+from crosscheck.engines.tree_engine import TreeCapabilities, TreeEngine, inertia_refusals
 from flexmb.scene.schema import Scene
 
 _RUNGS = 4
@@ -21,7 +22,7 @@ _SOFT = (
 _CLOSED = "events and controllers of scenes with closures or couplings: MuJoCo's are soft, and need its own steps"
 
 
-class MujocoEngine(PeerEngine):
+class MujocoEngine(TreeEngine):
     """Rigid trees with RK4, exact but for two artifices whose errors are at round-off (see `mujoco.tree`)."""
 
     name = "mujoco"
@@ -37,7 +38,7 @@ class MujocoEngine(PeerEngine):
     library = Library("MuJoCo", "mujoco", "mujoco")
     capabilities = TreeCapabilities(("spherical", "revolute", "weld"), KNOWN, couplings=True, armatures=True)
 
-    def refusals(self, scene: Scene) -> Iterator[str]:
+    def own_refusals(self, scene: Scene) -> Iterator[str]:
         yield from inertia_refusals((link for link in links(scene) if not is_bare_frame(link)), "MuJoCo")
         if is_hybrid(scene) and scene.constraints:
             yield _CLOSED

@@ -11,7 +11,8 @@ from crosscheck.engines.conventions import cross, shift_wrench
 from crosscheck.engines.links import Scalar, by_motion
 from crosscheck.engines.mujoco.forces import Forces
 from crosscheck.engines.mujoco.tree import MujocoClosure, MujocoTree
-from crosscheck.engines.rigid_tree import BodyMotion, Energies, TreeObserver, by_joint, placed_couplings
+from crosscheck.engines.rigid_tree import by_joint, placed_couplings
+from crosscheck.engines.tree_observer import BodyMotion, Energies, TreeObserver
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 

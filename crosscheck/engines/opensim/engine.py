@@ -7,8 +7,9 @@ from collections.abc import Iterator
 from crosscheck.engines.connections import KNOWN
 from crosscheck.engines.contract import Model
 from crosscheck.engines.links import links
-from crosscheck.engines.peer import Library, PeerEngine, TreeCapabilities
+from crosscheck.engines.peer import Library
 from crosscheck.engines.scipy_loop import RTOL_LADDER, ScipyModel
+from crosscheck.engines.tree_engine import TreeCapabilities, TreeEngine
 from flexmb.scene.hinges import ClosureKind
 from flexmb.scene.schema import Scene
 
@@ -17,7 +18,7 @@ MASSLESS = 1e-13
 """kg: OpenSim drops the inertia of bodies lighter than 2e-14 kg, so lighter ones are refused where they have one."""
 
 
-class OpensimEngine(PeerEngine):
+class OpensimEngine(TreeEngine):
     """Rigid trees and loops, exact: the forward dynamics of Simbody, OpenSim's multibody code."""
 
     name = "opensim"
@@ -33,7 +34,7 @@ class OpensimEngine(PeerEngine):
     capabilities = TreeCapabilities(CLOSED_BY, KNOWN, screws=True, couplings=True)
     ladder = RTOL_LADDER
 
-    def refusals(self, scene: Scene) -> Iterator[str]:
+    def own_refusals(self, scene: Scene) -> Iterator[str]:
         for link in links(scene):
             if link.inertia.mass < MASSLESS and link.inertia.inertia.any():
                 yield f'OpenSim drops the inertia of a link without mass ("{link.name}"): give it some mass'

@@ -5,7 +5,8 @@ from __future__ import annotations
 from crosscheck.engines.contract import Snapshot
 from crosscheck.engines.opensim.dynamics import OpensimDynamics
 from crosscheck.engines.opensim.tree import OpensimSlot, matrix, spatial
-from crosscheck.engines.rigid_tree import BodyMotion, Energies, TreeObserver, TreeState, by_joint
+from crosscheck.engines.rigid_tree import TreeState, by_joint
+from crosscheck.engines.tree_observer import BodyMotion, Energies, TreeObserver
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 

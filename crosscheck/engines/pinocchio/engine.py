@@ -7,8 +7,9 @@ from typing import get_args
 
 from crosscheck.engines.connections import KNOWN
 from crosscheck.engines.contract import Model
-from crosscheck.engines.peer import Library, PeerEngine, TreeCapabilities
+from crosscheck.engines.peer import Library
 from crosscheck.engines.scipy_loop import RTOL_LADDER
+from crosscheck.engines.tree_engine import TreeCapabilities, TreeEngine
 from flexmb.scene.hinges import ClosureKind
 from flexmb.scene.schema import Scene
 
@@ -16,7 +17,7 @@ MOST_JOINTS = 500
 WHY_NOT_MORE = "Pinocchio's data hold arrays of n x n x n numbers for n speeds, and more than 20 GB for 1000"
 
 
-class PinocchioEngine(PeerEngine):
+class PinocchioEngine(TreeEngine):
     """Rigid trees, exact: articulated-body accelerations, hybrid dynamics where coordinates are prescribed."""
 
     name = "pinocchio"
@@ -33,7 +34,7 @@ class PinocchioEngine(PeerEngine):
     capabilities = TreeCapabilities(get_args(ClosureKind), KNOWN, screws=True, couplings=True, armatures=True)
     ladder = RTOL_LADDER
 
-    def refusals(self, scene: Scene) -> Iterator[str]:
+    def own_refusals(self, scene: Scene) -> Iterator[str]:
         if len(scene.hinges) > MOST_JOINTS:
             yield f"{len(scene.hinges)} hinges are too many: {WHY_NOT_MORE}"
 

@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from crosscheck.engines.connections import WORLD, Moving
 from crosscheck.engines.conventions import cross, shift_wrench
-from crosscheck.engines.rigid_tree import STILL, BodyMotion
+from crosscheck.engines.tree_observer import STILL, BodyMotion
 from flexmb.typing import Real
 
 

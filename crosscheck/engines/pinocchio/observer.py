@@ -9,7 +9,8 @@ from crosscheck.engines.contract import Snapshot
 from crosscheck.engines.conventions import angular_first, cross, rotate_spatial
 from crosscheck.engines.pinocchio.dynamics import Dynamics
 from crosscheck.engines.pinocchio.forces import body_motion
-from crosscheck.engines.rigid_tree import BodyMotion, Energies, TreeObserver, TreeState, by_joint
+from crosscheck.engines.rigid_tree import TreeState, by_joint
+from crosscheck.engines.tree_observer import BodyMotion, Energies, TreeObserver
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 

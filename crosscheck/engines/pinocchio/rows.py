@@ -16,7 +16,8 @@ from crosscheck.engines.conventions import Frame, axes_with, cross
 from crosscheck.engines.links import closed_frames
 from crosscheck.engines.pinocchio.forces import ClosedLoad, body_motion, mass_matrix, on_both_sides
 from crosscheck.engines.pinocchio.tree import PinocchioTree
-from crosscheck.engines.rigid_tree import BodyMotion, TreeState, placed_couplings
+from crosscheck.engines.rigid_tree import TreeState, placed_couplings
+from crosscheck.engines.tree_observer import BodyMotion
 from flexmb.scene.hinges import WITH_AXIS, Closure, ClosureKind
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
