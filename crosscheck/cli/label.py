@@ -55,7 +55,7 @@ def label(
     from crosscheck.label.document import LabelFile, label, label_text, write_label
     from crosscheck.label.evidence import evidence as gathered
     from crosscheck.library.own_files import code_here
-    from crosscheck.terminal.labels import label_table, levels_table
+    from crosscheck.terminal.listings import label_table, levels_table
 
     labels = LabelFile(code=code_here(), subjects={each.name: label(each, gathered(each, folder)) for each in subjects})
     if len(labels.subjects) > 1:

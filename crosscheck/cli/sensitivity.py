@@ -40,8 +40,8 @@ def sensitivity(
     """
     chosen = common.asked(cases)
     from crosscheck.sampling.printed import ENGINE, FILE, RUNS, spreads
-    from crosscheck.sealed.stamp import add_stamped, stamped
-    from crosscheck.terminal.spreads import spreads_table
+    from crosscheck.sealed.seal import add_stamped, stamped
+    from crosscheck.terminal.listings import spreads_table
 
     with common.in_one_line() if out is None else common.sole_writer(out):
         found, written = {}, {}

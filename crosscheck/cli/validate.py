@@ -57,8 +57,7 @@ def validate(
     """
     with in_one_line() if out is None else sole_writer(out):
         from crosscheck.terminal.measured import identified_table, points_table, series_table, sets_table, told_progress
-        from crosscheck.validation.budget import budget
-        from crosscheck.validation.document import document
+        from crosscheck.validation.budget import budget, document
         from crosscheck.validation.measured_set import find_sets
 
         chosen = find_sets(sets)

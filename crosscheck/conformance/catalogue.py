@@ -7,10 +7,9 @@ from crosscheck.conformance.connectors import CONNECTORS
 from crosscheck.conformance.conventions import CONVENTIONS
 from crosscheck.conformance.form import FORM
 from crosscheck.conformance.linearised import LINEARISED
-from crosscheck.conformance.motion import MOTION
+from crosscheck.conformance.motion import MOTION, WHEELS
 from crosscheck.conformance.samples import SAMPLES
 from crosscheck.conformance.trees import TREES
-from crosscheck.conformance.wheels import WHEELS
 
 CHAPTERS = (FORM, CONVENTIONS, MOTION, SAMPLES, TREES, WHEELS, CONNECTORS, LINEARISED)
 CLAUSES: dict[str, Clause] = {clause.name: clause for chapter in CHAPTERS for clause in chapter.clauses}

@@ -7,17 +7,23 @@ from typing import Any
 import numpy as np
 
 from crosscheck.conformance.clause import (
+    INERTIA,
+    MASS,
+    NONE,
+    QUARTER,
+    THIRD,
     Chapter,
     acceleration,
     allowance,
+    arm,
     equal,
     finest_two,
     given,
+    hub,
     require,
     snapshot,
     within,
 )
-from crosscheck.conformance.scenes import INERTIA, MASS, NONE, QUARTER, THIRD, arm, hub
 from crosscheck.engines.contract import Engine
 from crosscheck.engines.conventions import cross_matrix, rotation_matrix
 from flexmb.scene.build import SceneBuilder

@@ -7,8 +7,20 @@ from typing import Any
 import numpy as np
 from msgspec.structs import replace
 
-from crosscheck.conformance.clause import Chapter, acceleration, equal, given, snapshot
-from crosscheck.conformance.scenes import ARM, INERTIA, MASS, NONE, QUARTER, G, arm
+from crosscheck.conformance.clause import (
+    ARM,
+    INERTIA,
+    MASS,
+    NONE,
+    QUARTER,
+    Chapter,
+    G,
+    acceleration,
+    arm,
+    equal,
+    given,
+    snapshot,
+)
 from crosscheck.engines.contract import Engine
 
 CONVENTIONS = Chapter(physical=True)

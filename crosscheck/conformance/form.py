@@ -12,8 +12,17 @@ import msgspec
 import numpy as np
 import psutil
 
-from crosscheck.conformance.clause import Chapter, allowance, equal, ladder, require, simplest, simulated
-from crosscheck.conformance.scenes import MASS, simple_scenes
+from crosscheck.conformance.clause import (
+    MASS,
+    Chapter,
+    allowance,
+    equal,
+    ladder,
+    require,
+    simple_scenes,
+    simplest,
+    simulated,
+)
 from crosscheck.engines.answers import RUNGS
 from crosscheck.engines.checked import CheckedEngine
 from crosscheck.engines.contract import ENERGIES, Engine, Model, Snapshot, Trajectory

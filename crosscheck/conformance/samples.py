@@ -10,8 +10,19 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.conformance.clause import Chapter, finest_two, given, hold_at_samples
-from crosscheck.conformance.scenes import ARM, INERTIA, MASS, NONE, SECOND, G, arm
+from crosscheck.conformance.clause import (
+    ARM,
+    INERTIA,
+    MASS,
+    NONE,
+    SECOND,
+    Chapter,
+    G,
+    arm,
+    finest_two,
+    given,
+    hold_at_samples,
+)
 from crosscheck.engines.contract import Engine, MarkerPath
 from crosscheck.engines.conventions import rotation_matrix
 from flexmb.scene.functions import Sine

@@ -10,8 +10,7 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 import numpy as np
 
 from crosscheck.engines.linear.coordinates import coordinate_names, obstacle, places
-from crosscheck.engines.linear.differences import differentiated
-from crosscheck.engines.linear.matrices import Errors, LinearMatrices, exact, norm, rounding
+from crosscheck.engines.linear.matrices import Errors, LinearMatrices, differentiated, exact, norm, rounding
 from crosscheck.engines.linear.outputs import NOTHING, LinearOutputs, outputs
 from crosscheck.engines.linear.parts import DERIVATIVES, LinearPart
 from flexmb.linear.equations import equations_of

@@ -10,6 +10,8 @@ import numpy as np
 
 from crosscheck.engines.contract import LINEAR, OUTPUTS, MarkerPath, Snapshot, Trajectory
 from crosscheck.engines.linear.outputs import NOTHING, LinearOutputs
+from crosscheck.engines.linear.parts import FREQUENCIES
+from flexmb.run.channels import channels_of
 from flexmb.typing import Real
 
 OF_A_STATE = tuple(name for name in OUTPUTS if name not in ("work", *LINEAR))
@@ -85,3 +87,22 @@ def continuous(quaternions: Real) -> Real:
     steps = np.sign(np.sum(quaternions[1:] * quaternions[:-1], axis=1))
     signs = np.cumprod(np.concatenate([[1.0], np.where(steps < 0.0, -1.0, 1.0)]))
     return quaternions * signs[:, None]
+
+
+# All channels of a run of any engine: the motion and its loads, and where they were asked for derivatives.
+
+KNOWN_TO = "known_to"
+
+
+def signals_of(run: Trajectory) -> dict[str, Real]:
+    """Every channel (T, k) of a run: those of `channels_of`, then those of the linearised motion.
+
+    Matrices are row by row. The channels "known_to.<name>" say how well the engine knows the derivatives and the
+    frequencies of its own states; nothing compares them.
+    """
+    signals = channels_of(run)
+    signals |= {f"derivatives.{name}": values for name, values in run.derivatives.items()}
+    if run.frequencies is not None:
+        signals[FREQUENCIES] = run.frequencies
+    signals |= {f"{KNOWN_TO}.{name}": values[:, None] for name, values in run.known_to.items()}
+    return signals

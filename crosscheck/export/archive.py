@@ -19,9 +19,8 @@ from crosscheck.export.formats.exudyn_script import exudyn_script
 from crosscheck.export.formats.mjcf import mjcf
 from crosscheck.export.formats.urdf import urdf
 from crosscheck.export.formats.written import Written
-from crosscheck.export.metadata import citation_cff, datacite, zenodo
+from crosscheck.export.metadata import case_page, citation_cff, collection_page, datacite, zenodo
 from crosscheck.export.model import modal_file, model_data
-from crosscheck.export.pages import case_page, collection_page
 from crosscheck.export.schemas import schema_files
 from crosscheck.library.case_error import CaseError
 from crosscheck.library.find import Case, shipped_folder

@@ -13,15 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from crosscheck.engines.openness import NOTHING_OPEN, Openness
-from crosscheck.judging.entries import coordinates_of, with_worst_entry
 from crosscheck.judging.finer_efforts import finer_efforts
-from crosscheck.judging.question import Question
+from crosscheck.judging.question import Question, coordinates_of, with_worst_entry
 from crosscheck.judging.results import CaseResults, Result
 from crosscheck.judging.sizes import Sizes
 from crosscheck.judging.uncertainty import Uncertainty
 from crosscheck.judging.verdict import Finding, Signal, Verdict, compare, determined, not_determined, with_open
 from crosscheck.library.case import ComparisonSide
-from crosscheck.library.patterns import most_specific
+from crosscheck.library.channels import most_specific
 from crosscheck.library.reference import StoredReference
 from crosscheck.records.kinds import RecordedReference, ReferenceGoals
 from crosscheck.records.packing import unpack

@@ -14,7 +14,7 @@ from typing import Literal, assert_never
 from crosscheck.judging.against_reference import REFERENCE
 from crosscheck.judging.results import CaseResults, Result
 from crosscheck.judging.verdict import NOT_DETERMINED, Verdict
-from crosscheck.library.patterns import most_specific
+from crosscheck.library.channels import most_specific
 from flexmb.run.channels import matches
 
 Kind = Literal["refused", "not offered", "not determined", "partly determined"]

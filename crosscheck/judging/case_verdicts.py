@@ -9,9 +9,8 @@ import numpy as np
 
 from crosscheck.judging.against_reference import judge_reference
 from crosscheck.judging.basis import basis
-from crosscheck.judging.entries import coordinates_of, with_worst_entry
 from crosscheck.judging.finer_efforts import finer_efforts
-from crosscheck.judging.question import Question
+from crosscheck.judging.question import Question, coordinates_of, with_worst_entry
 from crosscheck.judging.results import CaseResults, Result
 from crosscheck.judging.verdict import (
     SEVERITY,
@@ -25,8 +24,7 @@ from crosscheck.judging.verdict import (
 )
 from crosscheck.library.accepted import key
 from crosscheck.library.case import Band, Comparison, ComparisonSide, Conservation, Control
-from crosscheck.library.channels import CONSERVED
-from crosscheck.library.patterns import most_specific
+from crosscheck.library.channels import CONSERVED, most_specific
 from flexmb.run.channels import matches, norms
 
 CLOCK = 1e-9  # relative difference up to which two times are the same: old records have the engines' own times

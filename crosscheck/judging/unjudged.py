@@ -21,7 +21,7 @@ from crosscheck.judging.results import CaseResults, Result
 from crosscheck.judging.sizes import size_of
 from crosscheck.judging.verdict import WHOLE_RANGE, Signal, Status, Verdict, compare, determined
 from crosscheck.library.case import Comparison
-from crosscheck.library.patterns import most_specific
+from crosscheck.library.channels import most_specific
 from crosscheck.library.selection import expected_otherwise
 from flexmb.kept import kept
 from flexmb.run.channels import distance, magnitude

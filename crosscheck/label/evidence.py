@@ -24,8 +24,7 @@ from crosscheck.library.reference import KNOWLEDGE, current_reference, digest, h
 from crosscheck.records.kinds import CaseRecord
 from crosscheck.sealed.document import SealedCase, SealedResults
 from crosscheck.sealed.seal import FILE as RESULTS
-from crosscheck.sealed.seal import LIMIT, ResultsError, read_finished
-from crosscheck.sealed.stamp import opened, unlike
+from crosscheck.sealed.seal import LIMIT, ResultsError, opened, read_finished, unlike
 from flexmb.scene.reading import Unreadable, read_bytes
 
 SPREADS, BUDGETS, PROVENANCE, MEASURED = "sensitivity.json", "validation.json", "provenance.toml", "measured.toml"

@@ -1,17 +1,20 @@
 """A table of the kinds of channels, for patterns, records, reports and `crosscheck verify`.
 
 A channel of an item of the scene is named `<kind>:<item>.<part>` (`load:elbow.torque`, `drive:elbow`), any other
-`<kind>.<part>` (`energy.total`) or `<kind>` (`work`). `crosscheck.engines.signals` extracts the channels of a
+`<kind>.<part>` (`energy.total`) or `<kind>` (`work`). `crosscheck.engines.trajectories` extracts the channels of a
 trajectory; a test compares this table with it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 
 from crosscheck.engines.contract import ENERGIES
 from crosscheck.engines.linear.parts import DERIVATIVES, FREQUENCIES
-from crosscheck.engines.signals import KNOWN_TO
+from crosscheck.engines.trajectories import KNOWN_TO
+from flexmb.run.channels import matches
 
 
 @dataclass(frozen=True)
@@ -125,3 +128,52 @@ def part_of(channel: str) -> Part | None:
             parts = {part.name: part for part in kind.parts}
             return parts.get("") or parts.get(last)  # the name of an item may contain dots
     return None
+
+
+# Patterns of channels in a run file: the most specific pattern of a channel, and errors in patterns.
+
+PARTS = {kind.name: tuple(part.name for part in kind.parts if part.name) for kind in KINDS if kind.of_items}
+WHOLE = {
+    kind.name: tuple(part.name for part in kind.parts if part.name)
+    for kind in KINDS
+    if not kind.of_items and kind.name != KNOWN_TO
+}
+
+
+def most_specific(patterns: Iterable[str], channel: str) -> str | None:
+    """The first of the longest patterns that match the channel; None if none does."""
+    return max((pattern for pattern in patterns if matches(pattern, channel)), key=len, default=None)
+
+
+def fault(pattern: str) -> str:
+    """Why no channel can match the pattern; "" if one can.
+
+    A pattern is a kind (`load`), a kind and a name (`load:elbow`), or these and a part (`load:elbow.torque`). A name
+    with a dot needs its part, or `.*`.
+    """
+    kind, named, rest = pattern.partition(":")
+    if named:
+        parts = _matching(PARTS, kind)
+        if not parts:
+            return f'there is no kind "{kind}:"; it is one of {", ".join(f"{part}:" for part in PARTS)}'
+        name, dot, part = rest.rpartition(".")
+        if not (name if dot else rest):
+            return f"it names no {kind}"
+        known = [kind for group in parts for kind in group]
+        if dot and known and not any(fnmatchcase(kind, part) for kind in known):
+            return f'there is no "{part}" of a {kind}; it is one of {", ".join(known)}'
+        return ""
+    kind, dotted, part = pattern.partition(".")
+    if not dotted:
+        known = [*PARTS, *WHOLE]
+        return "" if any(fnmatchcase(each, kind) for each in known) else f"it is none of {', '.join(known)}"
+    parts = _matching(WHOLE, kind)
+    known = [kind for group in parts for kind in group]
+    if any(fnmatchcase(kind, part) for kind in known):
+        return ""
+    whole = ", ".join(f"{kind}.{part}" for kind, group in WHOLE.items() for part in group)
+    return f"channels with a dot alone are {whole}"
+
+
+def _matching(table: dict[str, tuple[str, ...]], kind: str) -> list[tuple[str, ...]]:
+    return [parts for each, parts in table.items() if fnmatchcase(each, kind)]

@@ -11,7 +11,7 @@ import msgspec
 
 from crosscheck.library.case_error import CaseError
 from crosscheck.library.case_words import Tags, chosen, meant
-from crosscheck.library.check.expected import check_expect_file
+from crosscheck.library.check.judged import check_expect_file
 from crosscheck.library.expect_file import EffortsEntry, ExpectFile, FailureEntry, FailureStatus, GoalEntry
 from flexmb.scene.problems import Place
 

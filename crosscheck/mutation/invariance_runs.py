@@ -18,9 +18,8 @@ from crosscheck.engines.registry import PROVIDER
 from crosscheck.judging.results import CaseResults, Result, collect
 from crosscheck.judging.uncertainty import Uncertainty, roundoff_floor
 from crosscheck.judging.verdict import Finding, Signal, Status, compare
-from crosscheck.library.channels import LINEAR_KINDS, is_judged
+from crosscheck.library.channels import LINEAR_KINDS, is_judged, most_specific
 from crosscheck.library.find import Case
-from crosscheck.library.patterns import most_specific
 from crosscheck.mutation.invariances import INVARIANCES, Counterpart, NotApplicable
 from crosscheck.mutation.subject import JudgedVariant, reduced, subject
 from crosscheck.records.archive import read

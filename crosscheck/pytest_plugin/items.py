@@ -11,9 +11,8 @@ import pytest
 from crosscheck.conformance.catalogue import CLAUSES
 from crosscheck.judging.verdict import Verdict, VerdictKind
 from crosscheck.library.case import CaseError
-from crosscheck.library.channels import CONSERVED
+from crosscheck.library.channels import CONSERVED, most_specific
 from crosscheck.library.find import Case
-from crosscheck.library.patterns import most_specific
 from crosscheck.library.reference import has_reference, load_reference
 from crosscheck.library.selection import alone, goals_for_reference
 from crosscheck.pytest_plugin.request import Request, marks_of

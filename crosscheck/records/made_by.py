@@ -30,7 +30,7 @@ RECORDING = (
     "crosscheck.engines.answers",
     "crosscheck.engines.contract",
     "crosscheck.engines.linear.outputs",
-    "crosscheck.engines.signals",
+    "crosscheck.engines.trajectories",
     "crosscheck.engines.trajectories",
     "crosscheck.records.kinds",
     "crosscheck.records.packing",

@@ -23,8 +23,7 @@ from crosscheck.library.reference import (
     values_text,
 )
 from crosscheck.library.work import changes
-from crosscheck.references.agreement import Agreed, agree
-from crosscheck.references.anchors import meet
+from crosscheck.references.agreement import Agreed, agree, meet
 from crosscheck.references.files import beyond_uncertainty, knowledge_text, largest_share, write_both
 from crosscheck.references.routes import RouteSignals, run_routes
 from crosscheck.running.plan import sample_times

@@ -14,9 +14,9 @@ from crosscheck.judging.work import work_of
 from crosscheck.label.document import FactorRow, SubjectLabel
 from crosscheck.label.factors import TITLES
 from crosscheck.library.case import Provenance
+from crosscheck.report.html import CasePlace
 from crosscheck.report.mutations import CaseScore
 from crosscheck.report.peaks import PeakRow, largest_loads
-from crosscheck.report.places import CasePlace
 from crosscheck.report.speed import SpeedTable, speed_tables
 from crosscheck.report.views import (
     Block,

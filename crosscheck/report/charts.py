@@ -13,7 +13,7 @@ import numpy as np
 
 from crosscheck.judging.against_reference import REFERENCE
 from crosscheck.judging.case_verdicts import drift_of
-from crosscheck.judging.entries import SYMBOL
+from crosscheck.judging.question import SYMBOL
 from crosscheck.judging.results import CaseResults, Result
 from crosscheck.judging.verdict import Verdict
 from crosscheck.library.channels import CONSERVED, KINDS

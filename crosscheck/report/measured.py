@@ -7,12 +7,10 @@ from pathlib import Path
 
 import msgspec
 
-from crosscheck.report.html import embedded, templates
-from crosscheck.report.places import INDEX, places
+from crosscheck.report.html import INDEX, embedded, places, templates
 from crosscheck.report.site import FOLDER, SINGLE, asset_files, clear_site, write_pages
-from crosscheck.validation.budget import Budget
-from crosscheck.validation.document import document
-from flexmb.output.files import write_whole
+from crosscheck.validation.budget import Budget, document
+from flexmb.output.whole import write_whole
 
 RESULTS = "validation.json"
 SCRIPTS = ("data.js", "charts.js", "page.js", "measured.js")

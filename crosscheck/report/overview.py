@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.judging.results import CaseResults, Session
 from crosscheck.judging.verdict import Verdict
-from crosscheck.report.places import CasePlace
+from crosscheck.report.html import CasePlace
 from crosscheck.report.views import INAPPLICABLE, VerdictCell, anchor, summary_cell
 
 

@@ -21,11 +21,10 @@ from crosscheck.judging.verdict import STATUSES
 from crosscheck.label.document import LabelFile
 from crosscheck.report.case_view import CaseView, case_view
 from crosscheck.report.charts import payload
-from crosscheck.report.html import embedded, source, templates
+from crosscheck.report.html import INDEX, CasePlace, embedded, places, source, templates
 from crosscheck.report.maps import Maps
 from crosscheck.report.mutations import Scores
 from crosscheck.report.overview import findings, matrix
-from crosscheck.report.places import INDEX, CasePlace, places
 from crosscheck.report.speed import LEVELS, speed_view
 from flexmb.output.files import folder, write_whole
 

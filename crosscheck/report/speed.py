@@ -14,7 +14,7 @@ from typing import Any
 
 from crosscheck.judging.results import CaseResults, Session
 from crosscheck.library.efforts import TARGETS, WITHIN, is_met
-from crosscheck.report.places import CasePlace
+from crosscheck.report.html import CasePlace
 from crosscheck.report.workprecision import Point, WorkPrecision, work_precision
 
 REACHED = 1e-6

@@ -17,9 +17,8 @@ from distributed import Worker as DaskWorker
 from distributed import WorkerPlugin, get_worker
 
 from crosscheck.library.own_files import code_here
-from crosscheck.running.processes import memory_limit, memory_of
 from crosscheck.running.scheduler import Event, Function
-from crosscheck.running.worker import TICK_S, Worker, keep_short
+from crosscheck.running.worker import TICK_S, Worker, keep_short, memory_limit, memory_of
 
 
 class Crew(WorkerPlugin):

@@ -12,9 +12,8 @@ import os
 import time
 from multiprocessing.connection import wait
 
-from crosscheck.running.processes import memory_limit, memory_of
 from crosscheck.running.scheduler import Event, Events, Waiting, Work
-from crosscheck.running.worker import SPAWN, TICK_S, Method, Worker, keep_short
+from crosscheck.running.worker import SPAWN, TICK_S, Method, Worker, keep_short, memory_limit, memory_of
 
 
 def run_jobs(work: Work, method: Method = SPAWN) -> Events:

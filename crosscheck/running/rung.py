@@ -13,7 +13,7 @@ import numpy as np
 from crosscheck.engines.answers import BrokenContract, describe
 from crosscheck.engines.contract import Effort, Model, Run, Trajectory
 from crosscheck.engines.openness import Openness
-from crosscheck.engines.signals import signals_of
+from crosscheck.engines.trajectories import signals_of
 from crosscheck.records.kinds import CHART, ENVELOPE, RunRecord
 from crosscheck.running.job import MAIN, Job
 from flexmb.typing import Real

@@ -13,9 +13,11 @@ from crosscheck.terminal.text import marked, words
 from flexmb.output.listing import Listing, figures, names, prose
 from flexmb.output.versions import version_of
 
-if TYPE_CHECKING:  # a table of one kind does not need the types of the others
+if TYPE_CHECKING:
+    from crosscheck.label.document import LabelFile, SubjectLabel
     from crosscheck.library.find import Case
     from crosscheck.running.installed import EngineState
+    from crosscheck.sampling.printed import VariantSpreads
     from crosscheck.stability.map import StabilityMap
     from crosscheck.timing.bench import CaseBench, Contest
     from crosscheck.verify.outcome import CsvOutcome
@@ -122,3 +124,55 @@ def _timed_table(timed: list[Contest]) -> Listing:
 
 def _percent(value: float, least: float) -> str:
     return f"{100.0 * (value / least - 1.0):.0f}"
+
+
+# Labels on the terminal: all factors of one subject, or the levels of many.
+
+
+def levels_table(labels: LabelFile) -> Listing:
+    """A row for each subject."""
+    from crosscheck.label.document import level_rows
+    from crosscheck.label.factors import FACTORS
+
+    heads = (factor.replace("_", " ") for factor in FACTORS)
+    table = Listing(*names("case"), *figures(*heads), title=f"Credibility by {labels.standard}, levels 0 to 4")
+    for row in level_rows(labels.subjects):
+        table.add(*row)
+    return table
+
+
+def label_table(name: str, label: SubjectLabel, everything: bool) -> Listing:
+    """A row for each factor, with the evidence that counts, or all that was looked at."""
+    from crosscheck.label.factors import TITLES
+
+    use = [f"Intended use: {label.intended_use}", *(f"Limit: {each}" for each in label.limits)]
+    table = Listing(
+        *names("factor"), *figures("level"), *prose("what the files show", "files", "raised by"),
+        title=f"{name}: {label.title}", caption=". ".join([*use, *(f"Waiver: {each}" for each in label.waivers)]),
+    )  # fmt: skip
+    for factor, row in label.factors.items():
+        shown = [each.words for each in row.evidence if everything or each.state != "absent"]
+        table.add(TITLES[factor], str(row.level), row.because, "; ".join(shown), row.raised_by)
+    return table
+
+
+# Spreads of channels under moved inputs, on the terminal.
+
+
+def spreads_table(case: str, found: Iterable[VariantSpreads], everything: bool) -> Listing:
+    """A row for each channel, or for that with the largest spread by digits of each kind of channel."""
+    table = Listing(
+        *names("variant", "channel"), *figures("inputs moved", "held", "2 ulp", "digits", "E", "U", "goal"), title=case
+    )
+    for of in found:
+        largest: dict[str, str] = {}
+        for name, spread in of.channels.items():
+            kind = name if everything else f"{name.partition(':')[0]}.{name.rpartition('.')[2]}"
+            if kind not in largest or spread.digits > of.channels[largest[kind]].digits:
+                largest[kind] = name
+        for name in largest.values():
+            each = of.channels[name]
+            numbers = (each.ulp, each.digits, each.E, each.U, each.goal)
+            cells = ("" if number is None else f"{number:.1e}" for number in numbers)
+            table.add(of.variant, name, str(of.moved), str(len(of.held)), *cells)
+    return table

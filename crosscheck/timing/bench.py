@@ -18,8 +18,7 @@ from crosscheck.library.case import CaseError
 from crosscheck.library.find import Case
 from crosscheck.running.scheduler import Limits
 from crosscheck.running.sweep import Listener
-from crosscheck.timing.facts import EngineFacts, facts_of
-from crosscheck.timing.rivals import Rival, Rivals, Rung, find_rivals, timed
+from crosscheck.timing.rivals import EngineFacts, Rival, Rivals, Rung, facts_of, find_rivals, timed
 from crosscheck.timing.turns import Timed
 
 Standing = Literal["equal", "apart", "not timed"]

@@ -16,8 +16,8 @@ from crosscheck.judging.results import Result, collect
 from crosscheck.judging.uncertainty import Uncertainty
 from crosscheck.judging.verdict import Signal
 from crosscheck.library.case import RunFile, Variant
+from crosscheck.library.channels import most_specific
 from crosscheck.library.find import Case
-from crosscheck.library.patterns import most_specific
 from crosscheck.library.reference import StoredReference, current_reference, has_reference
 from crosscheck.records.archive import read
 from crosscheck.references.other_times import reference_at

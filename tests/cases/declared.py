@@ -15,9 +15,8 @@ from crosscheck.engines.linear.parts import DERIVATIVES, FREQUENCIES
 from crosscheck.engines.registry import OWN_CODE
 from crosscheck.judging.unjudged import TOLD_BY
 from crosscheck.library.case import TAKES_APART, RunFile, Variant
-from crosscheck.library.channels import CONSERVED, KINDS
+from crosscheck.library.channels import CONSERVED, KINDS, most_specific
 from crosscheck.library.find import Case, load_case, shipped_folder, shipped_names
-from crosscheck.library.patterns import most_specific
 from crosscheck.library.reference import KNOWLEDGE, has_reference
 from crosscheck.library.selection import expected_otherwise, goals_for_reference, select
 from flexmb.scene.connectors import BetweenNodes
@@ -52,7 +51,7 @@ class Left:
 
 
 def offered(scene: Scene, variant: Variant, engine: str) -> list[str]:
-    """Every channel that the engine may offer: names as `crosscheck.engines.signals` gives them.
+    """Every channel that the engine may offer: names as `crosscheck.engines.trajectories` gives them.
 
     Of a beam that is taken apart a made-up joint stands for those between its parts. Exudyn's beams in a plane have
     neither energies nor momentum, those in space have both. Loads of point masses are given by flexmb alone.

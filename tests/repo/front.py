@@ -18,7 +18,7 @@ import numpy as np
 from crosscheck.judging.results import Session, collect
 from crosscheck.records.archive import read
 from crosscheck.records.session import standing
-from crosscheck.report.places import places
+from crosscheck.report.html import places
 from crosscheck.report.speed import LEVELS, ChartOfCase, fastest, speed_view
 from tests.repo.project import ROOT
 

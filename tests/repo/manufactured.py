@@ -7,11 +7,9 @@ from collections.abc import Iterator
 
 from crosscheck.engines.contract import EngineMissing
 from crosscheck.engines.registry import engine
-from crosscheck.manufacture.case import CANDIDATES, sample_times
+from crosscheck.manufacture.case import CANDIDATES, held, sample_times
 from crosscheck.manufacture.doubt import answers
-from crosscheck.manufacture.drives import manufacture
-from crosscheck.manufacture.held import held
-from crosscheck.manufacture.orders import orders
+from crosscheck.manufacture.drives import manufacture, orders
 from flexmb.run.channels import signal_range
 from tests.crosscheck.manufacture import scenes
 from tests.repo.project import ROOT

@@ -8,8 +8,8 @@ python -m tests.repo.margins
 from collections.abc import Iterator
 
 from crosscheck.judging.margins import NARROW, WIDE, FlaggedGoal, flagged_of, margin
+from crosscheck.library.channels import most_specific
 from crosscheck.library.find import Case, shipped_cases
-from crosscheck.library.patterns import most_specific
 from tests.repo.project import ROOT
 
 PAGE = ROOT / "docs" / "margins.md"

@@ -3,6 +3,6 @@
 They have the points, modes and second-order field of `model.json` and `modal/*.json`, and nothing of flexmb's dynamics.
 """
 
-from crosscheck.export.equations import rebuilt
+from crosscheck.export.model import rebuilt
 
 exact = rebuilt(__file__, rtol=1e-9)

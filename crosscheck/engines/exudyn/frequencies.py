@@ -20,9 +20,8 @@ from scipy.linalg import null_space
 
 from crosscheck.engines.exudyn.assembly import Assembly
 from crosscheck.engines.exudyn.state import States, set_state
-from crosscheck.engines.linear.differences import differentiated
 from crosscheck.engines.linear.frequencies import eigenfrequencies
-from crosscheck.engines.linear.matrices import EPS, Errors, LinearMatrices, norm
+from crosscheck.engines.linear.matrices import EPS, Errors, LinearMatrices, differentiated, norm
 from crosscheck.engines.linear.outputs import NOTHING, LinearOutputs
 from crosscheck.engines.linear.parts import FREQUENCIES
 from flexmb.typing import Real

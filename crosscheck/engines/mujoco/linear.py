@@ -2,7 +2,7 @@
 
 `mjd_transitionFD` differentiates one step by its state, with central differences. A semi-implicit Euler step of 1 s,
 without implicit damping, makes v + qacc of a speed v, so that its derivatives are those of the accelerations whatever
-the step. Those of several step sizes make differences of fourth order (`crosscheck.engines.linear.differences`). The
+the step. Those of several step sizes make differences of fourth order (`crosscheck.engines.linear.matrices`). The
 inverse of the mass matrix is by MuJoCo's factors. Inertias that MuJoCo makes us raise (`mujoco.tree`) change it by
 their share, which is part of the errors.
 
@@ -21,8 +21,7 @@ import numpy as np
 from crosscheck.engines.conventions import rotation_matrix
 from crosscheck.engines.linear.axes import OutboardAxes, swapped_transport
 from crosscheck.engines.linear.coordinates import obstacle
-from crosscheck.engines.linear.differences import fourth_order
-from crosscheck.engines.linear.matrices import EPS, Errors, LinearMatrices, norm, rounding
+from crosscheck.engines.linear.matrices import EPS, Errors, LinearMatrices, fourth_order, norm, rounding
 from crosscheck.engines.linear.slots import slot_places
 from crosscheck.engines.mujoco.forces import Forces
 from crosscheck.engines.mujoco.tree import LEAST_INERTIA, MujocoTree

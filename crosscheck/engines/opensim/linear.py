@@ -10,8 +10,15 @@ import numpy as np
 
 from crosscheck.engines.conventions import quaternion_rate
 from crosscheck.engines.linear.coordinates import obstacle
-from crosscheck.engines.linear.differences import differentiated
-from crosscheck.engines.linear.matrices import EPS, Errors, LinearMatrices, norm, quaternion_transport, rounding
+from crosscheck.engines.linear.matrices import (
+    EPS,
+    Errors,
+    LinearMatrices,
+    differentiated,
+    norm,
+    quaternion_transport,
+    rounding,
+)
 from crosscheck.engines.linear.slots import slot_places
 from crosscheck.engines.opensim.dynamics import OpensimDynamics
 from crosscheck.engines.opensim.tree import outboard_rotation

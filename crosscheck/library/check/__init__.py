@@ -9,12 +9,12 @@ from collections.abc import Iterator
 
 from crosscheck.library.accepted import Accepted
 from crosscheck.library.case import CaseError, Provenance, RunFile
-from crosscheck.library.check.figures import check_figures
 from crosscheck.library.check.judged import (
     check_chart,
     check_comparison,
     check_conservation,
     check_control,
+    check_figures,
     check_open,
 )
 from crosscheck.library.check.ranges import (
@@ -27,8 +27,7 @@ from crosscheck.library.check.ranges import (
     problem,
 )
 from crosscheck.library.check.references import check_anchors, check_reference
-from crosscheck.library.check.runs import check_sides_run
-from crosscheck.library.check.variants import check_variant
+from crosscheck.library.check.variants import check_sides_run, check_variant
 from flexmb.scene.problems import Defect
 
 TIME_LIMITS_S = (1e-3, 1e7)

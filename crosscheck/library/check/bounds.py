@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from crosscheck.library.case import Band, Comparison, Conservation, RunFile
 from crosscheck.library.check.ranges import problem
-from crosscheck.library.check.runs import find_variant
+from crosscheck.library.check.variants import find_variant
 from flexmb.scene.problems import Defect, Place
 
 WIDEST = 100.0  # largest ratio of a band's limits

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+import re
+from collections.abc import Iterable, Iterator, Set
 
+from crosscheck.library.accepted import Accepted
 from crosscheck.library.case import Chart, Comparison, Conservation, Control, OpenChannels, RunFile
+from crosscheck.library.channels import fault, part_of
 from crosscheck.library.check.bounds import check_band, check_expectation
-from crosscheck.library.check.ranges import SIZES, check_fraction, check_within, problem
-from crosscheck.library.check.runs import (
+from crosscheck.library.check.ranges import ROOT, SIZES, check_fraction, check_within, problem
+from crosscheck.library.check.variants import (
     check_engines_once,
     check_same_times,
     check_sides_run,
     find_variant,
     no_variant,
 )
-from crosscheck.library.patterns import fault
+from crosscheck.library.expect_file import ExpectFile
 from flexmb.scene.problems import Defect, Place, closest
 
 
@@ -124,3 +128,87 @@ def check_pattern(pattern: str, place: Place) -> Iterator[Defect]:
     if why:
         remedy = "write a kind of channel, or kind:name, or kind:name.part"
         yield problem(place, f'"{pattern}" can name no channel: {why}', remedy)
+
+
+# Rules of `crosscheck-expect.toml`: engines that exist, patterns that can name a channel, numbers, reasons.
+
+EFFORTS = (1e-15, 1e3)  # steps in s, or relative tolerances
+MOST_EFFORTS = 10
+
+
+def check_expect_file(content: ExpectFile, engines: Iterable[str]) -> Iterator[Defect]:
+    """All problems; `engines` are those that there are."""
+    engines = tuple(engines)
+    for number, goal in enumerate(content.goals):
+        place = ROOT.key("goal", number)
+        yield from _common(goal.engine, goal.cases, engines, place)
+        yield from _reason(goal.reason, place)
+        if not goal.goals:
+            yield problem(place.key("goals"), "it names no channel", '{ "*" = 1e-3 }')
+        for pattern, value in goal.goals.items():
+            yield from check_pattern(pattern, place.key("goals"))
+            yield from check_fraction(value, place.key("goals", pattern))
+    for number, failure in enumerate(content.failures):
+        place = ROOT.key("expected_failure", number)
+        yield from _common(failure.engine, failure.cases, engines, place)
+        yield from _reason(failure.reason, place)
+        if not failure.channels:
+            yield problem(place.key("channels"), "it names no channel", "leave it out to mean all channels")
+        for pattern in failure.channels:
+            yield from check_pattern(pattern, place.key("channels"))
+    for number, efforts in enumerate(content.efforts):
+        place = ROOT.key("efforts", number)
+        yield from _common(efforts.engine, efforts.cases, engines, place)
+        if not 1 <= len(efforts.values) <= MOST_EFFORTS:
+            yield problem(place.key("values"), f"{len(efforts.values)} efforts", f"give 1 to {MOST_EFFORTS}")
+        for value in efforts.values:
+            yield from check_within(value, EFFORTS, place.key("values"))
+
+
+def _common(engine: str, cases: tuple[str, ...], engines: tuple[str, ...], place: Place) -> Iterator[Defect]:
+    if engine not in engines:
+        yield problem(place.key("engine"), f'there is no engine "{engine}"', closest(engine, engines))
+    if not cases:
+        yield problem(place.key("cases"), "it means no case", 'leave it out to mean all, or write ["pendulums/*"]')
+
+
+def _reason(reason: str, place: Place) -> Iterator[Defect]:
+    if not reason.strip():
+        yield problem(place.key("reason"), "it is empty", "say why, for those who review the file")
+
+
+# Rules of accepted figures: each is a valid number and belongs to something that the run file judges.
+
+SIDE = re.compile(r"[^()]+ \((.+)\)")
+
+
+def check_figures(accepted: Accepted, run: RunFile) -> Iterator[Defect]:
+    names = [item.name for item in run.comparisons]
+    names += [f"{item.quantity.replace('_', ' ')} conserved" for item in run.conservations]
+    variants = {variant.name for variant in run.variants}
+    stale = "take it out; `crosscheck run --accept` writes what is there now"
+    for name, table in accepted.items():
+        place = ROOT.key(name)
+        if name not in names:
+            yield problem(place, "the run file has no such comparison", stale)
+        for where, figure in table.items():
+            if what := _of_no_verdict(where, variants):
+                yield problem(place.key(where), what, stale)
+            if not (0.0 <= figure.E < math.inf and 0.0 <= figure.U < math.inf):
+                yield problem(place.key(where), f"E = {figure.E:g}, U = {figure.U:g} are no figures", stale)
+
+
+def _of_no_verdict(where: str, variants: Set[str]) -> str:
+    """Why no verdict of the run file can have this key of an accepted figure; "" if one can."""
+    channel, *sides = where.split(" | ")
+    if len(sides) != 2:
+        return "it is no channel with two sides"
+    if part_of(channel) is None:
+        return f'there is no kind of channel such as "{channel}"'
+    for side in sides:
+        match = SIDE.fullmatch(side)
+        if match is None:
+            return f'"{side}" is not an engine with a variant in brackets'
+        if match[1] not in variants:
+            return f'the run file has no variant "{match[1]}"'
+    return ""

@@ -6,11 +6,10 @@ from collections.abc import Iterator
 from math import isfinite
 
 from crosscheck.library.case import Provenance, RunFile, Variant
+from crosscheck.library.channels import fault
 from crosscheck.library.check.judged import check_pattern, check_patterns
 from crosscheck.library.check.ranges import MOST_SAMPLES, ROOT, check_within, problem
-from crosscheck.library.check.runs import check_engines_once, find_variant, no_variant
-from crosscheck.library.check.variants import check_ladder
-from crosscheck.library.patterns import fault
+from crosscheck.library.check.variants import check_engines_once, check_ladder, find_variant, no_variant
 from crosscheck.library.recipe import ReferenceRecipe, ReferenceRoute
 from flexmb.scene.problems import Defect, Place
 

@@ -1,11 +1,9 @@
 """Invariances: changes of a scene, such as of frames or units, under which all results must stay the same."""
 
-from crosscheck.mutation.invariances.boosted import BOOSTED
-from crosscheck.mutation.invariances.clock import CLOCK
 from crosscheck.mutation.invariances.counterpart import Counterpart, Invariance, NotApplicable
-from crosscheck.mutation.invariances.later import LATER
+from crosscheck.mutation.invariances.later import CLOCK, LATER
 from crosscheck.mutation.invariances.mirrored import MIRRORED
-from crosscheck.mutation.invariances.placed import MOVED, TURNED
+from crosscheck.mutation.invariances.placed import BOOSTED, MOVED, TURNED
 from crosscheck.mutation.invariances.restated import REORDERED, RESTATED
 from crosscheck.mutation.invariances.units import RESCALED
 

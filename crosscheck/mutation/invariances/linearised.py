@@ -25,7 +25,7 @@ from crosscheck.engines.linear.coordinates import (
     obstacle,
 )
 from crosscheck.engines.linear.parts import FREQUENCIES
-from crosscheck.engines.signals import KNOWN_TO
+from crosscheck.engines.trajectories import KNOWN_TO
 from flexmb.scene.bodies import BeamBody
 from flexmb.scene.freedoms import Ball, Floating, ScalarFreedom
 from flexmb.scene.schema import Hinge, PointMass, Scene, Wheel

@@ -13,7 +13,7 @@ from crosscheck.engines.contract import Effort, Run, Trajectory
 from crosscheck.engines.hybrid.loop import HybridMotion
 from crosscheck.engines.hybrid.refusals import refusal
 from crosscheck.engines.registry import engine
-from crosscheck.engines.signals import signals_of
+from crosscheck.engines.trajectories import signals_of
 from crosscheck.judging.uncertainty import RungSignal, estimate
 from crosscheck.judging.verdict import Finding, Signal, compare
 from flexmb.scene.schema import Scene

@@ -13,9 +13,8 @@ from crosscheck.engines.answers import BrokenContract, checked_run
 from crosscheck.engines.checked import CheckedEngine
 from crosscheck.engines.contract import EngineMissing, Run, Trajectory
 from crosscheck.engines.linear.coordinates import coordinate_names, modes_of, obstacle, places
-from crosscheck.engines.linear.differences import differentiated
 from crosscheck.engines.linear.frequencies import eigenfrequencies
-from crosscheck.engines.linear.matrices import Errors, LinearMatrices, exact, scaled_condition
+from crosscheck.engines.linear.matrices import Errors, LinearMatrices, differentiated, exact, scaled_condition
 from crosscheck.engines.linear.parts import DERIVATIVES, FREQUENCIES
 from crosscheck.engines.registry import engine
 from flexmb.linear.linearize import linearize

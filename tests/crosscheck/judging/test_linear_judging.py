@@ -4,8 +4,8 @@ import msgspec
 import numpy as np
 import pytest
 
-from crosscheck.judging.entries import entry
 from crosscheck.judging.outcome import SessionOutcome, conclude
+from crosscheck.judging.question import entry
 from crosscheck.judging.results import Result, collect
 from crosscheck.library.find import load_case, shipped_folder
 from crosscheck.library.reference import column_names, parse_values, scene_digest, values_text

@@ -23,8 +23,7 @@ from crosscheck.library.find import load_case
 from crosscheck.records.session import last_session
 from crosscheck.report import write_all
 from crosscheck.report.measured import write_measured
-from crosscheck.sealed.seal import read_finished, write_results
-from crosscheck.sealed.stamp import add_stamped, stamped
+from crosscheck.sealed.seal import add_stamped, read_finished, stamped, write_results
 from crosscheck.validation.budget import budget
 from crosscheck.validation.measured_set import read_set
 from tests.crosscheck.sessions import copy_case, edit, referenced, run_case, versus

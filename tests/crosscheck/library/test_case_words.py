@@ -16,7 +16,7 @@ from crosscheck import cli
 from crosscheck.cli.common import CaseWord, CaseWords
 from crosscheck.engines.contract import ENERGIES, LINEAR, OUTPUTS, MarkerPath, Snapshot, Trajectory
 from crosscheck.engines.linear.parts import DERIVATIVES, FREQUENCIES
-from crosscheck.engines.signals import signals_of
+from crosscheck.engines.trajectories import signals_of
 from crosscheck.library.case_error import CaseError
 from crosscheck.library.case_words import chosen, meant
 from crosscheck.library.channels import CONSERVED, KINDS, is_judged, kind_named, known_to, part_of

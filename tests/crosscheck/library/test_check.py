@@ -14,10 +14,10 @@ from crosscheck.engines.contract import MarkerPath, Trajectory
 from crosscheck.library import case as case_module
 from crosscheck.library.accepted import Figure
 from crosscheck.library.case import CaseError, RunFile
+from crosscheck.library.channels import fault
 from crosscheck.library.check import check_accepted, check_run_file
 from crosscheck.library.check.ranges import MOST_SAMPLES
 from crosscheck.library.find import load_case
-from crosscheck.library.patterns import fault
 from flexmb.run.channels import channels_of, matches
 from tests.crosscheck.sessions import copy_case, shipped
 

@@ -17,10 +17,9 @@ from crosscheck.engines.registry import engine
 from crosscheck.library.case_error import CaseError
 from crosscheck.library.find import load_case, shipped_folder
 from crosscheck.library.reference import current_reference
-from crosscheck.manufacture.case import sample_times
+from crosscheck.manufacture.case import Held, held, sample_times
 from crosscheck.manufacture.doubt import answers
 from crosscheck.manufacture.drives import Manufactured, MotionLoads, manufacture, without_motors
-from crosscheck.manufacture.held import Held, held
 from crosscheck.manufacture.motion import draw
 from crosscheck.references.regenerate import regenerate
 from flexmb.dense import DenseSystem

@@ -12,7 +12,7 @@ import pytest
 from crosscheck.engines.answers import checked_run
 from crosscheck.engines.contract import OUTPUTS, MarkerPath, Trajectory
 from crosscheck.engines.linear.parts import DERIVATIVES, FREQUENCIES
-from crosscheck.engines.signals import signals_of
+from crosscheck.engines.trajectories import signals_of
 from crosscheck.judging.outcome import conclude
 from crosscheck.judging.results import collect
 from crosscheck.library.case import Comparison

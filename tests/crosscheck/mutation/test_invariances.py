@@ -12,8 +12,7 @@ import pytest
 
 from crosscheck.engines.contract import Run
 from crosscheck.engines.native import NativeEngine
-from crosscheck.engines.signals import signals_of
-from crosscheck.engines.trajectories import stack
+from crosscheck.engines.trajectories import signals_of, stack
 from crosscheck.library.channels import LINEAR_KINDS, is_judged, known_to
 from crosscheck.library.find import resolve
 from crosscheck.mutation.invariances import INVARIANCES, Counterpart, Invariance, NotApplicable

@@ -44,7 +44,7 @@ WITHOUT_PART = {
     "crosscheck.records.kinds": "holds the stored reference, which is made of other runs",
     "crosscheck.pytest_plugin": "finds our modules inside pytest, as Python would",
     "flexmb.output.files": "says what is wrong with a folder",
-    "crosscheck.running.scheduler": "says what a scheduler is", "crosscheck.running.processes": "ends processes",
+    "crosscheck.running.scheduler": "says what a scheduler is", "crosscheck.running.worker": "ends processes",
     "crosscheck.records.made_by": "makes the key", "crosscheck.records.sources": "makes the key",
     "flexmb.surrogate": "makes scenes, as plan", "flexmb.scene.check": "refuses scenes, and changes none",
     "flexmb.scene.build": "makes scenes", "flexmb.scene.collecting": "makes scenes",

@@ -7,8 +7,7 @@ import pytest
 
 from crosscheck.judging.uncertainty import Uncertainty
 from crosscheck.library.case import CaseError, PublishedNumber
-from crosscheck.references.agreement import KNOWN, agree
-from crosscheck.references.anchors import meet
+from crosscheck.references.agreement import KNOWN, agree, meet
 from crosscheck.references.routes import RouteSignals
 from flexmb.typing import Real
 

@@ -14,9 +14,8 @@ from crosscheck.mutation.campaign import MutationFile
 from crosscheck.mutation.mutants import PassedOver
 from crosscheck.mutation.score import Mutant, Outcome, ShownIn, mutation_score
 from crosscheck.report import write_all
-from crosscheck.report.html import source
+from crosscheck.report.html import places, source
 from crosscheck.report.mutations import FILE, read_scores
-from crosscheck.report.places import places
 from crosscheck.report.site import LISTING, SINGLE
 from crosscheck.report.views import comparison_blocks
 from tests.crosscheck.report.sessions import MANY, session

@@ -10,9 +10,8 @@ import psutil
 import pytest
 
 from crosscheck.running.pool import run_jobs
-from crosscheck.running.processes import memory_limit
 from crosscheck.running.scheduler import Event, Work
-from crosscheck.running.worker import LOG_LIMIT_BYTES, TICK_S
+from crosscheck.running.worker import LOG_LIMIT_BYTES, TICK_S, memory_limit
 
 
 def work(job: str, emit: Callable[[object], None]) -> None:

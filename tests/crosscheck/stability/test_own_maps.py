@@ -9,9 +9,8 @@ from crosscheck import cli
 from crosscheck.report import write_all
 from crosscheck.report.maps import Maps, read_maps
 from crosscheck.stability.map_records import CellRecord, identity, read
-from crosscheck.stability.own_maps import maps_in
 from crosscheck.stability.picture import draw
-from crosscheck.stability.run import run_map
+from crosscheck.stability.run import maps_in, run_map
 from crosscheck.stability.verdict_file import read_verdicts, write_verdicts
 from flexmb.scene.user_code import no_user_code
 from tests.crosscheck.report.sessions import MANY, session

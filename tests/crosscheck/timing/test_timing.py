@@ -24,9 +24,8 @@ from crosscheck.timing import turns
 from crosscheck.timing.bench import CaseBench, Contest, bench
 from crosscheck.timing.benchmark_json import benchmark_document
 from crosscheck.timing.chart import CaseCharts, ChartPoint, chart, with_front
-from crosscheck.timing.facts import UNSAID, facts_of
 from crosscheck.timing.page import folder_name, write_case, write_index
-from crosscheck.timing.rivals import find_rivals
+from crosscheck.timing.rivals import UNSAID, facts_of, find_rivals
 from crosscheck.timing.turns import CompileTimes, FirstSolve, Sample, Timed, Turn, TurnFailure, in_turns, take_turn
 from tests.crosscheck.sessions import referenced, run_here
 

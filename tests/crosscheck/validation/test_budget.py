@@ -11,8 +11,7 @@ from typer.testing import CliRunner
 
 from crosscheck.cli.common import app
 from crosscheck.library.case_error import CaseError
-from crosscheck.validation.budget import budget
-from crosscheck.validation.document import document
+from crosscheck.validation.budget import budget, document
 from crosscheck.validation.measured_set import MeasuredSet, find_set, find_sets, read_set, shipped_sets
 from crosscheck.validation.model import MeasuredModel
 from flexmb.scene.user_code import no_user_code

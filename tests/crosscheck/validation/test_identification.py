@@ -10,8 +10,7 @@ import pytest
 
 from crosscheck.library.case_error import CaseError
 from crosscheck.report.measured import write_measured
-from crosscheck.validation.budget import budget
-from crosscheck.validation.document import document
+from crosscheck.validation.budget import budget, document
 from crosscheck.validation.identification import identified
 from crosscheck.validation.measured_set import MeasuredSet, Reading, read_set
 from tests.crosscheck.validation.test_budget import HEAD

@@ -12,8 +12,7 @@ from typer.testing import CliRunner
 from crosscheck.cli.common import app
 from crosscheck.report.measured import RESULTS, write_measured
 from crosscheck.report.site import LISTING
-from crosscheck.validation.budget import budget
-from crosscheck.validation.document import document
+from crosscheck.validation.budget import budget, document
 from crosscheck.validation.measured_set import read_set
 from tests.crosscheck.report.test_site import Page
 from tests.crosscheck.validation.test_budget import LINE, SLOPE, made
