@@ -200,6 +200,7 @@ class Engine(Protocol):
     `settings`, a sentence or two on how it is run: its best solver, what is switched off, whose loop steps it, and what
     its `wall_s` contains. `takes` names what its adapter handles of "connectors", "couplings", "controllers" and
     "events" (a scene with others is refused) and "t_start" (runs that begin at another time than 0).
+    `methods` are integrators that efforts may name besides those of its ladders: a sweep refuses others at once.
     `precision` is "single" where the code computes with 32-bit floats, else "double": the clauses of the contract take
     their bounds from its unit roundoff; verdicts on cases do not, since U follows from the engine's efforts.
     `efforts_for(scene, duration_s)` replaces `efforts` for engines with fixed steps, whose ladder depends on the

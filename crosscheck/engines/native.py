@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
+from typing import get_args
 
 import numpy as np
 from msgspec import structs
@@ -70,6 +71,7 @@ class NativeEngine:
     )
 
     takes = ("connectors", "couplings", "controllers", "events", "t_start")
+    methods = get_args(Method)
 
     def __init__(
         self,

@@ -30,6 +30,8 @@ class PeerEngine:
     takes: tuple[str, ...] = ()
     library: Library
     ladder: tuple[Effort, ...] = ()
+    methods: tuple[str, ...] = ()
+    """Integrators that efforts may name besides those of the ladder."""
 
     def version(self) -> str:
         """Version of the library; raises EngineMissing."""

@@ -30,6 +30,7 @@ def absolute_tolerance(rtol: float) -> float:
     return max(_ATOL_RATIO * rtol, _LEAST_ATOL)
 
 
+METHODS = ("DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA")  # of `solve_ivp`
 RTOL_LADDER = tuple(Effort("tolerance", rtol, "DOP853") for rtol in (1e-6, 1e-8, 1e-10, 1e-12))
 
 

@@ -18,9 +18,10 @@ from crosscheck.engines.registry import OWN_CODE
 from crosscheck.judging.against_reference import of_record, shared_times
 from crosscheck.judging.results import CaseResults, Result
 from crosscheck.library.case import Chart
+from crosscheck.library.channels import relative_error
 from crosscheck.records.kinds import RunRecord
 from crosscheck.records.packing import unpack
-from flexmb.run.channels import distance, signal_range
+from flexmb.run.channels import signal_range
 from flexmb.typing import Real
 
 RESOLVED = 2.0  # factor to which estimates of U are accurate
@@ -51,7 +52,7 @@ class ChartReference:
         scale = self.scale(observable)
         if run is self.run:
             return self.uncertainty / scale
-        return float(np.max(distance(observable, result.values(observable, run)[places], self.values))) / scale
+        return relative_error(observable, result.values(observable, run)[places], self.values, scale)
 
 
 def chart_reference(case: CaseResults, chart: Chart) -> ChartReference | None:

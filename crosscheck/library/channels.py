@@ -11,10 +11,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
+import numpy as np
+
 from crosscheck.engines.contract import ENERGIES
 from crosscheck.engines.linear.parts import DERIVATIVES, FREQUENCIES
 from crosscheck.engines.trajectories import KNOWN_TO
-from flexmb.run.channels import matches
+from flexmb.run.channels import distance, matches
+from flexmb.typing import Real
 
 
 @dataclass(frozen=True)
@@ -177,3 +180,11 @@ def fault(pattern: str) -> str:
 
 def _matching(table: dict[str, tuple[str, ...]], kind: str) -> list[tuple[str, ...]]:
     return [parts for each, parts in table.items() if fnmatchcase(each, kind)]
+
+
+def relative_error(channel: str, values: Real, reference: Real, scale: float) -> float:
+    """The largest distance of samples (n, k) from those of a reference over the size of the signal; infinite if it is
+    no number."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        error = float(np.max(distance(channel, values, reference))) / scale
+    return error if np.isfinite(error) else np.inf

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import inf
 from typing import Literal
 
 TARGETS = tuple(float(f"1e-{digits}") for digits in range(1, 10))  # errors for which charts have an effort
@@ -13,6 +14,17 @@ TIGHTEST = 1e-13  # relative tolerance: one more decade is below 100 eps, where 
 def is_met(error: float, target: float) -> bool:
     """Whether a run with this error is as accurate as the target, and at most ten times more so."""
     return target / WITHIN < error <= target
+
+
+def on_front(runs: Sequence[tuple[float, float]], floor: float) -> list[bool]:
+    """Of runs by seconds and error whether no faster one is as accurate; errors below the `floor` count as equal, and
+    an infinite error is none."""
+    best, smallest = [False] * len(runs), inf
+    for run in sorted(range(len(runs)), key=lambda run: runs[run]):
+        error = max(runs[run][1], floor)
+        if error < smallest:
+            best[run], smallest = True, error
+    return best
 
 
 def with_extra(values: Sequence[float], extra: Sequence[float]) -> tuple[float, ...]:

@@ -8,12 +8,12 @@ that were made for the chart. Runs that failed have no error and are kept as suc
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-
-import numpy as np
+from math import inf
 
 from crosscheck.judging.chart_reference import ChartReference, chart_reference
 from crosscheck.judging.results import CaseResults, Result
 from crosscheck.library.case import Chart
+from crosscheck.library.efforts import on_front
 from crosscheck.records.kinds import RunRecord
 
 
@@ -97,12 +97,6 @@ def _point(run: RunRecord, result: Result, observable: str, reference: ChartRefe
 
 def _with_front(points: list[Point], doubt: float) -> list[Point]:
     """The points by wall time; a point is marked `best` if no faster one is known to be as accurate."""
-    smallest = np.inf
-    marked = []
-    for point in sorted(points, key=lambda point: point.wall_s):
-        error = np.inf if point.error is None else max(point.error, doubt)
-        best = error < smallest
-        if best:
-            smallest = error
-        marked.append(replace(point, best=best))
-    return marked
+    rising = sorted(points, key=lambda point: point.wall_s)
+    best = on_front([(each.wall_s, inf if each.error is None else each.error) for each in rising], doubt)
+    return [replace(point, best=is_best) for point, is_best in zip(rising, best, strict=True)]

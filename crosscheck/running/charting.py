@@ -6,7 +6,7 @@ import hashlib
 import time
 from collections.abc import Callable
 from functools import partial
-from math import inf, isfinite
+from math import inf
 from typing import Any, Literal
 
 import msgspec
@@ -15,6 +15,7 @@ import numpy as np
 from crosscheck.engines.answers import clean, describe
 from crosscheck.engines.contract import Effort, Model
 from crosscheck.engines.registry import find_engine
+from crosscheck.library.channels import relative_error
 from crosscheck.library.efforts import TARGETS, WITHIN
 from crosscheck.records.kinds import CHART, ChartRecord, Confirmed, RunRecord
 from crosscheck.records.made_by import made_by
@@ -22,7 +23,6 @@ from crosscheck.running.execute import checked, execute, packed
 from crosscheck.running.job import Job
 from crosscheck.running.rung import Solved, repeats_of, solve_rung
 from crosscheck.running.tuned import BUDGET_S, LOOSEST, Asked, Charted, ProcessorBudget, TriedEffort, tune
-from flexmb.run.channels import distance
 
 HERE = ("crosscheck.running.charting", "crosscheck.running.tuned")  # what determines the runs, besides the engine
 
@@ -126,7 +126,6 @@ def _error(solved: Solved, asked: Asked) -> float:
     """The largest distance from the reference, of its size; infinite where there is none."""
     if solved.record.status != "finished" or asked.observable not in solved.channels:
         return inf
-    values = solved.channels[asked.observable][asked.places]
-    with np.errstate(over="ignore", invalid="ignore"):
-        error = float(np.max(distance(asked.observable, values, asked.values))) / asked.scale
-    return error if isfinite(error) else inf
+    return relative_error(
+        asked.observable, solved.channels[asked.observable][asked.places], asked.values, asked.scale
+    )

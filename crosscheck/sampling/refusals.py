@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import get_args
 
 import numpy as np
 
@@ -17,30 +16,9 @@ from crosscheck.library.channels import part_of
 from crosscheck.sampling.file import SampleEffort, SweepFile, SweptQuantity
 from crosscheck.sampling.sample import LETTERS, place_of
 from crosscheck.sampling.values import require_numbers
-from flexmb.integrate.integrator import Method
 from flexmb.scene.problems import Defect, Place, closest
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
-
-SCIPY = ("DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA")
-# Integrators that engines accept besides those of their own ladders, by the beginning of the engine's name.
-BESIDE = {
-    "native": get_args(Method),
-    "pinocchio": SCIPY,
-    "dart": SCIPY,
-    "basilisk": SCIPY,
-    "opensim": SCIPY,
-    "kane": SCIPY,
-    "mujoco": ("RK4", "Euler", "implicit", "implicitfast"),
-    "exudyn": (
-        "TrapezoidalIndex2", "GeneralizedAlpha", "ExplicitEuler", "ExplicitMidpoint", "RK33", "RK44", "RK67", "ODE23",
-        "DOPRI5", "DVERK6",
-    ),
-    "drake": (
-        "runge_kutta5", "runge_kutta3", "runge_kutta2", "bogacki_shampine3", "explicit_euler", "semi_explicit_euler",
-        "implicit_euler", "radau1", "radau3", "velocity_implicit_euler",
-    ),
-}  # fmt: skip
 
 
 def require_sense(file: Path, sweep: SweepFile, scene: Scene, times: Real, values: Real, provider: str) -> None:
@@ -114,15 +92,14 @@ def _engines(sweep: SweepFile, scene: Scene, duration_s: float, provider: str) -
             if effort.engine != name:
                 continue
             try:
-                own = {effort.method for effort in engine.efforts(scene)}
+                own = {effort.method for effort in engine.efforts(scene)}.union(getattr(engine.engine, "methods", ()))
             except Exception:  # it refuses the scene: every sample reports that
                 continue
             if wrong := _method(effort, own):
                 yield Defect(str(Place().key("efforts", number, "method")), *wrong)
 
 
-def _method(effort: SampleEffort, own: set[str]) -> tuple[str, str] | None:
-    known = own | {method for begin, beside in BESIDE.items() if effort.engine.startswith(begin) for method in beside}
+def _method(effort: SampleEffort, known: set[str]) -> tuple[str, str] | None:
     if effort.method in known:
         return None
     return f'{effort.engine} has no method "{effort.method}"', closest(effort.method, known)

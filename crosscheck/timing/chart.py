@@ -13,6 +13,7 @@ from math import inf
 
 from crosscheck.engines.registry import PROVIDER
 from crosscheck.library.case import CaseError
+from crosscheck.library.efforts import on_front
 from crosscheck.library.find import Case
 from crosscheck.running.scheduler import Limits
 from crosscheck.running.sweep import Listener
@@ -162,12 +163,5 @@ def _quantile(rising: Sequence[float], part: float) -> float:
 
 def with_front(points: Sequence[ChartPoint], floor: float) -> list[ChartPoint]:
     """The same points, with `best` set for those on the Pareto front; errors below the floor count as equal."""
-    smallest, front = inf, set()
-    timed = [point for point in points if point.solve_s is not None and point.error is not None]
-    for point in sorted(timed, key=lambda point: (point.solve_s, point.error)):
-        assert point.error is not None
-        error = max(point.error, floor)
-        if error < smallest:
-            smallest = error
-            front.add(id(point))
-    return [replace(point, best=True) if id(point) in front else point for point in points]
+    runs = [(inf, inf) if each.solve_s is None or each.error is None else (each.solve_s, each.error) for each in points]
+    return [replace(point, best=best) for point, best in zip(points, on_front(runs, floor), strict=True)]

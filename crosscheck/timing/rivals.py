@@ -22,6 +22,7 @@ from crosscheck.judging.against_reference import ReferenceSignals, hold, of_reco
 from crosscheck.judging.results import CaseResults, Result, collect
 from crosscheck.judging.verdict import Finding
 from crosscheck.library.case import CaseError, Chart, Variant
+from crosscheck.library.channels import relative_error
 from crosscheck.library.find import Case
 from crosscheck.records.archive import read
 from crosscheck.records.kinds import RecordedReference, ReferenceGoals, RunRecord
@@ -31,7 +32,6 @@ from crosscheck.running.scheduler import Limits
 from crosscheck.running.sweep import Listener, run_planned
 from crosscheck.timing.charted import chart_jobs
 from crosscheck.timing.turns import Timed, in_turns
-from flexmb.run.channels import distance
 from flexmb.typing import Real
 
 
@@ -226,9 +226,7 @@ def _errors(
     errors = {}
     for name, scale in scales.items():
         if name in channels and channels[name].shape[1:] == reference.channels[name].shape[1:]:
-            with np.errstate(over="ignore", invalid="ignore"):
-                apart = float(np.max(distance(name, channels[name][places], reference.channels[name]))) / scale
-            errors[name] = apart if np.isfinite(apart) else np.inf
+            errors[name] = relative_error(name, channels[name][places], reference.channels[name], scale)
     return errors
 
 

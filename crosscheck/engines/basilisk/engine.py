@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from crosscheck.engines.basilisk.craft import NoCraft, craft_of
 from crosscheck.engines.contract import Model
 from crosscheck.engines.peer import Library
-from crosscheck.engines.scipy_loop import RTOL_LADDER, ScipyModel
+from crosscheck.engines.scipy_loop import METHODS, RTOL_LADDER, ScipyModel
 from crosscheck.engines.tree_engine import TreeCapabilities, TreeEngine
 from flexmb.scene.schema import Scene
 
@@ -25,7 +25,7 @@ class BasiliskEngine(TreeEngine):
     )
     library = Library("Basilisk", "Basilisk", "bsk")
     capabilities = TreeCapabilities()
-    ladder = RTOL_LADDER
+    ladder, methods = RTOL_LADDER, METHODS
 
     def own_refusals(self, scene: Scene) -> Iterator[str]:
         try:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from crosscheck.engines.contract import Model
 from crosscheck.engines.links import links
 from crosscheck.engines.peer import Library
-from crosscheck.engines.scipy_loop import RTOL_LADDER, ScipyModel
+from crosscheck.engines.scipy_loop import METHODS, RTOL_LADDER, ScipyModel
 from crosscheck.engines.tree_engine import TreeCapabilities, TreeEngine
 from flexmb.scene.schema import Scene
 
@@ -25,7 +25,7 @@ class DartEngine(TreeEngine):
     library = Library("DART", "dartpy", "dartpy")
     # its constraints are impulses in a step and no part of the forward dynamics
     capabilities = TreeCapabilities(loops="closes loops by impulses of its own steps only, to first order")
-    ladder = RTOL_LADDER
+    ladder, methods = RTOL_LADDER, METHODS
 
     def model(self, scene: Scene) -> Model:
         from crosscheck.engines.dart.dynamics import DartDynamics

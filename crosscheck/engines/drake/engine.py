@@ -27,6 +27,11 @@ class DrakeEngine(TreeEngine):
     # Accuracies bound the absolute error of one step; that of a run is about a thousand times as large.
     ladder = tuple(Effort("tolerance", accuracy, "runge_kutta5") for accuracy in (1e-8, 1e-10, 1e-12, 1e-13))
 
+    methods = (
+        "runge_kutta5", "runge_kutta3", "runge_kutta2", "bogacki_shampine3", "explicit_euler", "semi_explicit_euler",
+        "implicit_euler", "radau1", "radau3", "velocity_implicit_euler",
+    )  # fmt: skip
+
     def own_refusals(self, scene: Scene) -> Iterator[str]:
         yield from inertia_refusals(links(scene), "Drake")
 

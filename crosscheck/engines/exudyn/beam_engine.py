@@ -14,7 +14,7 @@ import numpy as np
 from crosscheck.engines.contract import Effort, MarkerPath, MarkerSnapshot, Model, Run, Snapshot, Trajectory
 from crosscheck.engines.exudyn.beams import PlanarBeam, assemble_beam, axis_sign, floats, root_frame
 from crosscheck.engines.exudyn.kkt import initial_state
-from crosscheck.engines.exudyn.library import LIBRARY
+from crosscheck.engines.exudyn.library import LIBRARY, METHODS
 from crosscheck.engines.exudyn.model import ExudynModel
 from crosscheck.engines.exudyn.solve import integrate
 from crosscheck.engines.exudyn.spatial import fastest_bending, reason, spatial_refusals
@@ -51,7 +51,7 @@ class ExudynBeamEngine(PeerEngine):
         "modes, so its error contains the distance of the models."
     )
 
-    library = LIBRARY
+    library, methods = LIBRARY, METHODS
 
     def refusals(self, scene: Scene) -> Iterator[str]:
         return iter(()) if _in_plane(scene) else spatial_refusals(scene)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from crosscheck.engines.contract import Effort, Model
 from crosscheck.engines.exudyn.assembly import flexible, unconstrained
-from crosscheck.engines.exudyn.library import LIBRARY
+from crosscheck.engines.exudyn.library import LIBRARY, METHODS
 from crosscheck.engines.exudyn.solve import EXPLICIT
 from crosscheck.engines.exudyn.support import approximations, refusals
 from crosscheck.engines.pace import fastest_mode, pace
@@ -19,7 +19,7 @@ RUNGS = 3
 
 
 class ExudynEngine(PeerEngine):
-    library = LIBRARY
+    library, methods = LIBRARY, METHODS
     name = "exudyn"
     takes = ("connectors",)
     summary = "rigid bodies and floating frames in redundant coordinates"

@@ -19,6 +19,7 @@ import numpy as np
 from scipy.linalg import null_space
 
 from crosscheck.engines.exudyn.assembly import Assembly
+from crosscheck.engines.exudyn.library import Equations, accelerations, equations
 from crosscheck.engines.exudyn.state import States, set_state
 from crosscheck.engines.linear.frequencies import eigenfrequencies
 from crosscheck.engines.linear.matrices import EPS, Errors, LinearMatrices, differentiated, norm
@@ -33,11 +34,8 @@ RANK = 1e-9  # singular values of C, relative to the largest, that count as zero
 
 def frequencies(assembly: Assembly, states: States) -> LinearOutputs:
     """The frequencies (T,n) at all samples, and how well they are known; nothing unless all are equilibria."""
-    solver = _Residual(assembly)
-    try:
-        samples = [solver.at(states, sample) for sample in range(len(states.times))]
-    finally:
-        solver.close()
+    with equations(assembly.shop.mbs) as system:
+        samples = [_at(assembly, system, states, sample) for sample in range(len(states.times))]
     known = [frequency for frequency in samples if frequency is not None]
     if len(known) < len(samples) or not len(known[0].by_speed):
         return NOTHING
@@ -45,60 +43,22 @@ def frequencies(assembly: Assembly, states: States) -> LinearOutputs:
     return LinearOutputs({}, rows, {FREQUENCIES: doubts})
 
 
-class _Residual:
-    """Exudyn's mass matrix, right-hand side f and Jacobian C of the constraints, by its implicit solver."""
+def _at(assembly: Assembly, system: Equations, states: States, sample: int) -> LinearMatrices | None:
+    """The matrices of the motions Z that are allowed; None unless the state is an equilibrium."""
+    set_state(assembly.shop.mbs, states, sample)
+    if system.k:
+        assembly.shop.mbs.systemData.SetAECoordinates(np.zeros(system.k))
+    q, v = states.q[sample], states.v[sample]
+    M, f, C = system.mass(), system.force(q, v), system.jacobian(q)
+    a, multipliers = accelerations(M, f, C, np.zeros(system.k))
+    left = float(np.abs(np.concatenate([a, v])).max(initial=0.0))
+    if left > AT_REST:
+        return None
 
-    def __init__(self, assembly: Assembly) -> None:
-        self._mbs, exu = assembly.shop.mbs, assembly.shop.exu
-        self._settings = exu.SimulationSettings()
-        self._settings.solution.file.write = False
-        self._settings.timeIntegration.verboseMode = 0
-        self._solver = exu.MainSolverImplicitSecondOrder()
-        self._solver.InitializeSolver(self._mbs, self._settings)
-        self._k = self._solver.GetAEsize()
+    def residual(change: Real) -> Real:
+        return system.force(q + change, v) - system.jacobian(q + change).T @ multipliers
 
-    def close(self) -> None:
-        self._solver.FinalizeSolver(self._mbs, self._settings)
-
-    def at(self, states: States, sample: int) -> LinearMatrices | None:
-        """The matrices of the motions Z that are allowed; None unless the state is an equilibrium."""
-        set_state(self._mbs, states, sample)
-        if self._k:
-            self._mbs.systemData.SetAECoordinates(np.zeros(self._k))
-        q, v = states.q[sample], states.v[sample]
-        n = len(q)
-        M, f, C = self._mass(n), self._force(q, v), self._jacobian(q)
-        system = np.block([[M, C.T], [C, np.zeros((self._k, self._k))]])
-        solution = np.linalg.lstsq(system, np.concatenate([f, np.zeros(self._k)]), rcond=1e-14)[0]
-        a, multipliers = solution[:n], solution[n:]
-        left = float(np.abs(np.concatenate([a, v])).max(initial=0.0))
-        if left > AT_REST:
-            return None
-
-        def residual(change: Real) -> Real:
-            return self._force(q + change, v) - self._jacobian(q + change).T @ multipliers
-
-        return _reduced(M, C, residual, lambda change: self._force(q, v + change), f, left)
-
-    def _mass(self, n: int) -> Real:
-        self._solver.ComputeMassMatrix(self._mbs)
-        return np.array(self._solver.GetSystemMassMatrix())[:n, :n]
-
-    def _force(self, q: Real, v: Real) -> Real:
-        data = self._mbs.systemData
-        data.SetODE2Coordinates(q)
-        data.SetODE2Coordinates_t(v)
-        self._solver.ComputeODE2RHS(self._mbs)
-        return np.array(self._solver.GetSystemResidual())[: len(q)]
-
-    def _jacobian(self, q: Real) -> Real:
-        n, k = len(q), self._k
-        if not k:
-            return np.zeros((0, n))
-        self._mbs.systemData.SetODE2Coordinates(q)
-        self._solver.SetSystemJacobian(np.zeros((n + k, n + k)))
-        self._solver.ComputeJacobianAE(self._mbs, velocityLevel=False)
-        return np.array(self._solver.GetSystemJacobian())[n:, :n]
+    return _reduced(M, C, residual, lambda change: system.force(q, v + change), f, left)
 
 
 def _reduced(

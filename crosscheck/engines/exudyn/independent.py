@@ -10,7 +10,7 @@ import numpy as np
 
 from crosscheck.engines.exudyn.assembly import Assembly, assemble
 from crosscheck.engines.exudyn.joints import CONSTRAINED
-from crosscheck.engines.exudyn.library import constraint_jacobian, evaluator
+from crosscheck.engines.exudyn.library import equations
 from crosscheck.engines.exudyn.state import States
 from crosscheck.engines.links import closed_frames, links, radius_of_gyration
 from flexmb.scene.schema import Scene
@@ -47,12 +47,12 @@ def opening(whole: Assembly, states: States) -> tuple[int, str]:
         for each in whole.scene.closures
     }
     rows = {name: list(data.GetObjectLTGAE(link.connectors[0][0])) for name, link in whole.closures.items()}
-    with evaluator(whole.shop.mbs) as (solver, n):
+    with equations(whole.shop.mbs) as system:
         for sample in range(len(states.times)):
             data.SetODE2Coordinates(states.q[sample])
             data.SetODE2Coordinates_t(states.v[sample])
-            solver.ComputeAlgebraicEquations(whole.shop.mbs, False)
-            gap = np.abs(np.array(solver.GetSystemResidual())[n:])
+            system.solver.ComputeAlgebraicEquations(whole.shop.mbs, False)
+            gap = np.abs(np.array(system.solver.GetSystemResidual())[system.n :])
             for name, own in rows.items():  # of every joint the first three are displacements
                 if not (np.max(gap[own[:3]]) <= OPENED * sizes[name] and np.max(gap[own[3:]], initial=0.0) <= OPENED):
                     return sample, name
@@ -74,6 +74,5 @@ def _rows(assembly: Assembly) -> int:
 
 def _jacobian(assembly: Assembly) -> Real:
     """(k, n) of all constraints where the run begins."""
-    mbs = assembly.shop.mbs
-    with evaluator(mbs) as (solver, n):
-        return constraint_jacobian(mbs, solver, n)
+    with equations(assembly.shop.mbs) as system:
+        return system.jacobian()

@@ -9,7 +9,7 @@ import numpy as np
 
 from crosscheck.engines.exudyn.assembly import Assembly
 from crosscheck.engines.exudyn.beams import PlanarBeam
-from crosscheck.engines.exudyn.library import constraint_jacobian, evaluator
+from crosscheck.engines.exudyn.library import accelerations, equations
 from crosscheck.engines.exudyn.rotations import local_rate_map
 from crosscheck.engines.exudyn.state import States
 from flexmb.typing import Real
@@ -29,31 +29,16 @@ def initial_state(assembly: Assembly | PlanarBeam) -> States:
     """
     mbs = assembly.shop.mbs
     data = mbs.systemData
-    with evaluator(mbs) as (solver, n):
+    with equations(mbs) as system:
         q, v = np.array(data.GetODE2Coordinates()), np.array(data.GetODE2Coordinates_t())
-        k = solver.GetAEsize()
-        if k:
-            data.SetAECoordinates(np.zeros(k))
-        solver.ComputeMassMatrix(mbs)
-        M = np.array(solver.GetSystemMassMatrix())[:n, :n]
-        solver.ComputeODE2RHS(mbs)
-        f = np.array(solver.GetSystemResidual())[:n]
-
-        def jacobian(at: Real) -> Real:
-            data.SetODE2Coordinates(at)
-            return constraint_jacobian(mbs, solver, n)
-
-        a, multipliers = np.linalg.solve(M, f) if not k else None, np.zeros(k)
-        if k:
-            C = jacobian(q)
+        M, f, C, kept = system.mass(), system.force(), np.zeros((0, system.n)), np.zeros(0)
+        if system.k:
+            C = system.jacobian()
             dt = _DISTANCE / max(1.0, np.abs(v).max())
-            near, far = (jacobian(q + h * v) - jacobian(q - h * v) for h in (dt, 2.0 * dt))
-            rate = (8.0 * near - far) / (12.0 * dt)
+            near, far = (system.jacobian(q + h * v) - system.jacobian(q - h * v) for h in (dt, 2.0 * dt))
             data.SetODE2Coordinates(q)
-            right = -rate @ v + _prescribed_accelerations(assembly, k)
-            system = np.block([[M, C.T], [C, np.zeros((k, k))]])
-            solution = np.linalg.lstsq(system, np.concatenate([f, right]), rcond=1e-14)[0]
-            a, multipliers = solution[:n], solution[n:]
+            kept = -(8.0 * near - far) / (12.0 * dt) @ v + _prescribed_accelerations(assembly, system.k)
+        a, multipliers = accelerations(M, f, C, kept)
     stored = np.array(data.GetDataCoordinates())
     return States(np.zeros(1), q[None], v[None], a[None], multipliers[None], stored[None])
 

@@ -7,7 +7,7 @@ from typing import assert_never
 
 from crosscheck.engines.contract import Model
 from crosscheck.engines.peer import PeerEngine
-from crosscheck.engines.scipy_loop import RTOL_LADDER, ScipyModel
+from crosscheck.engines.scipy_loop import METHODS, RTOL_LADDER, ScipyModel
 from flexmb.scene.bodies import BeamBody, Body, ModalBody, RigidBody, SidBody
 from flexmb.scene.hinges import (
     Cylindrical,
@@ -39,7 +39,7 @@ class KaneEngine(PeerEngine):
         "NumPy, called by SciPy's DOP853: a witness, not a rival. It shares no mechanics with flexmb, and is written "
         "to be read, not to be fast. Outputs are computed after the timed solve."
     )
-    ladder = RTOL_LADDER
+    ladder, methods = RTOL_LADDER, METHODS
 
     def version(self) -> str:
         return VERSION

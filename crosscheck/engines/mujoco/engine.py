@@ -35,6 +35,7 @@ class MujocoEngine(TreeEngine):
         "functions of time are callbacks in Python where a scene has them. Scenes with events or controllers are "
         "stepped in Python, by the same method around its accelerations. Outputs are computed after the timed solve."
     )
+    methods = ("RK4", "Euler", "implicit", "implicitfast")
     library = Library("MuJoCo", "mujoco", "mujoco")
     capabilities = TreeCapabilities(("spherical", "revolute", "weld"), KNOWN, couplings=True, armatures=True)
 

@@ -8,7 +8,7 @@ from crosscheck.engines.connections import KNOWN
 from crosscheck.engines.contract import Model
 from crosscheck.engines.links import links
 from crosscheck.engines.peer import Library
-from crosscheck.engines.scipy_loop import RTOL_LADDER, ScipyModel
+from crosscheck.engines.scipy_loop import METHODS, RTOL_LADDER, ScipyModel
 from crosscheck.engines.tree_engine import TreeCapabilities, TreeEngine
 from flexmb.scene.hinges import ClosureKind
 from flexmb.scene.schema import Scene
@@ -32,7 +32,7 @@ class OpensimEngine(TreeEngine):
     )
     library = Library("OpenSim", "opensim", "opensim")
     capabilities = TreeCapabilities(CLOSED_BY, KNOWN, screws=True, couplings=True)
-    ladder = RTOL_LADDER
+    ladder, methods = RTOL_LADDER, METHODS
 
     def own_refusals(self, scene: Scene) -> Iterator[str]:
         for link in links(scene):

@@ -8,7 +8,7 @@ from typing import get_args
 from crosscheck.engines.connections import KNOWN
 from crosscheck.engines.contract import Model
 from crosscheck.engines.peer import Library
-from crosscheck.engines.scipy_loop import RTOL_LADDER
+from crosscheck.engines.scipy_loop import METHODS, RTOL_LADDER
 from crosscheck.engines.tree_engine import TreeCapabilities, TreeEngine
 from flexmb.scene.hinges import ClosureKind
 from flexmb.scene.schema import Scene
@@ -32,7 +32,7 @@ class PinocchioEngine(TreeEngine):
     )
     library = Library("Pinocchio", "pinocchio", "pin")
     capabilities = TreeCapabilities(get_args(ClosureKind), KNOWN, screws=True, couplings=True, armatures=True)
-    ladder = RTOL_LADDER
+    ladder, methods = RTOL_LADDER, METHODS
 
     def own_refusals(self, scene: Scene) -> Iterator[str]:
         if len(scene.hinges) > MOST_JOINTS:
