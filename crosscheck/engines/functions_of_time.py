@@ -41,6 +41,24 @@ def profile(function: Function, signals: Signals | None = None) -> Callable[[flo
     return _with_last_kept(_evaluated(function))
 
 
+class Moved(Protocol):
+    """A coordinate that a function of time may drive."""
+
+    @property
+    def value(self) -> float: ...
+    @property
+    def rate(self) -> float: ...
+    @property
+    def prescribed(self) -> Function | None: ...
+
+
+def initial(coordinate: Moved) -> tuple[float, float]:
+    """Value and rate at t = 0: of the prescribed function where there is one, else the scene's initial values."""
+    if coordinate.prescribed is None:
+        return coordinate.value, coordinate.rate
+    return profile(coordinate.prescribed)(0.0)[:2]
+
+
 def _with_last_kept(evaluate: Callable[[float], Profile]) -> Callable[[float], Profile]:
     """The same function, evaluated once for successive calls at the same time.
 

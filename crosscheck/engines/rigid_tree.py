@@ -20,7 +20,7 @@ from crosscheck.engines.conventions import (
     scalar_last,
     shift_wrench,
 )
-from crosscheck.engines.functions_of_time import Profile, Signals, profile
+from crosscheck.engines.functions_of_time import Profile, Signals, initial, profile
 from crosscheck.engines.links import Attachment, Ball, Floating, Freedom, Link, Scalar, attachment
 from flexmb.scene.schema import Load, Scene
 from flexmb.scene.tree import coupled
@@ -84,20 +84,13 @@ def motors(slots: Sequence[Slot], signals: Signals | None = None) -> list[tuple[
     return [(slot.v, profile(slot.freedom.effort, signals)) for slot in moved]
 
 
-def scalar_start(freedom: Scalar) -> tuple[float, float]:
-    """Value and rate of a scalar freedom at t = 0, those of its prescribed motion if it has one."""
-    if freedom.prescribed is None:
-        return freedom.value, freedom.rate
-    return profile(freedom.prescribed)(0.0)[:2]
-
-
 def scene_start(slots: Sequence[Slot], sizes: tuple[int, int], counting: Counting) -> tuple[Real, Real]:
     """q and v, of these sizes, at t = 0; free flight has position and quaternion in q."""
     q, v = (np.zeros(size) for size in sizes)
     for slot in slots:
         match slot.freedom:
             case Scalar() as freedom:
-                q[slot.q], v[slot.v] = scalar_start(freedom)
+                q[slot.q], v[slot.v] = initial(freedom)
             case Ball() as freedom:
                 q[slot.q : slot.q + 4] = counting.of_scene(freedom.quaternion)
                 v[slot.v : slot.v + 3] = freedom.angular_velocity

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 import msgspec
@@ -14,7 +14,6 @@ from crosscheck.judging.unjudged import grouped
 from crosscheck.judging.verdict import STATUSES, Verdict
 from crosscheck.label.document import FILE as LABEL
 from crosscheck.label.document import LabelFile, heads, level_rows
-from crosscheck.label.factors import FACTORS
 from crosscheck.sealed.compare import Differences
 from flexmb.output.files import write_whole
 from flexmb.output.printable import printable
@@ -39,84 +38,51 @@ def write_verdicts(outcome: SessionOutcome, file: Path) -> None:
 def write_summary(outcome: SessionOutcome, file: Path, labels: LabelFile | None = None) -> None:
     """summary.md: headline, counts by case, what is not as expected, did not run, is not applicable or not judged, and
     the levels of the labels."""
-    lines = [f"# {'✅' if outcome.ok else '❌'} {_flat(outcome.headline)}", ""]
-    lines += [f"| case | verdicts | as expected | {' | '.join(STATUSES)} |"]
-    lines += ["|---" * (3 + len(STATUSES)) + "|"]
-    for case, verdicts in outcome.verdicts.items():
-        counts = [sum(verdict.ok for verdict in verdicts)]
-        counts += [sum(verdict.status == status for verdict in verdicts) for status in STATUSES]
-        lines.append(f"| {_flat(case)} | {len(verdicts)} | {' | '.join(map(str, counts))} |")
-    if outcome.unexpected:
-        lines += ["", "## Not as expected", "", "| case | comparison | channel | pair | status | expected | reason |"]
-        lines += ["|---|---|---|---|---|---|---|"]
-        lines += [_row(verdict) for verdict in outcome.unexpected[:SHOWN]]
-        if len(outcome.unexpected) > SHOWN:
-            lines += ["", f"... and {len(outcome.unexpected) - SHOWN} more, in verdicts.json."]
-    if outcome.lost_controls:
-        lines += ["", "## Deliberate faults that were compared in nothing", ""]
-        lines += [f"- {_flat(str(control))}" for control in outcome.lost_controls]
-    if outcome.contracts:
-        lines += ["", "## Contracts of outside engines", ""]
-        lines += [f"- {_flat(state.words(name))}" for name, state in outcome.contracts.items()]
+    counts = [
+        [case, str(len(verdicts)), str(sum(verdict.ok for verdict in verdicts))]
+        + [str(sum(verdict.status == status for verdict in verdicts)) for status in STATUSES]
+        for case, verdicts in outcome.verdicts.items()
+    ]
+    lines = [f"# {'✅' if outcome.ok else '❌'} {_flat(outcome.headline)}"]
+    lines += _table(("case", "verdicts", "as expected", *STATUSES), [[_flat(case), *cells] for case, *cells in counts])
+    lines += _section("Not as expected", ("status", "expected", "reason"), outcome.unexpected, _unexpected)
+    lines += _list("Deliberate faults that were compared in nothing", map(str, outcome.lost_controls))
+    lines += _list("Contracts of outside engines", (state.words(name) for name, state in outcome.contracts.items()))
     lines += _claims(outcome)
-    lines += _table("Worse than recorded", outcome.worse, lambda verdict: verdict.worse)
-    lines += _table("Beyond stale figures", outcome.outgrown, lambda verdict: verdict.grown)
+    lines += _told("Worse than recorded", outcome.worse, lambda verdict: verdict.worse)
+    lines += _told("Beyond stale figures", outcome.outgrown, lambda verdict: verdict.grown)
     if outcome.strict:
-        lines += _table("No accepted figures", outcome.unrecorded, lambda verdict: "`crosscheck run --accept` records")
-    if outcome.work_changes:
-        lines += ["", "## Other work than recorded", "", *(f"- {_flat(str(each))}" for each in outcome.work_changes)]
-    if outcome.flagged:
-        lines += ["", "## Margins of goals", "", "| case | comparison | goals | which | extreme |"]
-        lines += ["|---|---|---|---|---|"]
-        for each in outcome.flagged[:SHOWN]:
-            cells = (_flat(each.case), _flat(each.comparison), f"{each.channels} of {each.judged}", WORDS[each.flag])
-            extreme = f"{_code(each.channel)}: {each.extreme:.2g}, goal {each.goal:.2g}"
-            lines.append(f"| {' | '.join(cells)} | {extreme} |")
-        if len(outcome.flagged) > SHOWN:
-            lines += ["", f"... and {len(outcome.flagged) - SHOWN} more, in results.json."]
-    lines += _work(outcome)
+        lines += _told("No accepted figures", outcome.unrecorded, lambda verdict: "`crosscheck run --accept` records")
+    lines += _list("Other work than recorded", map(str, outcome.work_changes))
+    margins = [
+        (_flat(each.case), _flat(each.comparison), f"{each.channels} of {each.judged}", WORDS[each.flag],
+         f"{_code(each.channel)}: {each.extreme:.2g}, goal {each.goal:.2g}")
+        for each in outcome.flagged
+    ]  # fmt: skip
+    lines += _table(("case", "comparison", "goals", "which", "extreme"), margins, "Margins of goals", "results.json")
+    if outcome.work:
+        work = [
+            [_flat(cell) for cell in (case, variant, engine, of_run.effort, of_run.words(engine))]
+            for (case, variant, engine), of_run in outcome.main_work.items()
+        ]
+        heads_of_work = ("case", "variant", "engine", "effort", "work")
+        lines += _table(heads_of_work, work, "Work of the finest runs", "results.json")
     if labels is not None and labels.subjects:
-        lines += ["", f"## Credibility by {labels.standard}, levels 0 to 4", "", f"| case | {' | '.join(heads())} |"]
-        lines += ["|---" * (1 + len(FACTORS)) + "|"]
-        lines += [f"| {' | '.join(map(_flat, row))} |" for row in level_rows(labels.subjects)]
+        levels = [[_flat(cell) for cell in row] for row in level_rows(labels.subjects)]
+        lines += _table(("case", *heads()), levels, f"Credibility by {labels.standard}, levels 0 to 4")
         lines += ["", f"What stands behind each level is in {LABEL}, and on the pages of the cases."]
     if outcome.absences:
         lines += ["", "## What did not run to the end, and why", ""]
         for absence in outcome.absences:
-            what = _flat(
-                f"{absence.case}, {absence.variant}, {absence.engine}{role_words(absence.role)}: {absence.reason}"
-            )
-            lines.append(f"- **{absence.status}** {what}")
-    if outcome.inapplicable:
-        lines += ["", "## Not applicable", ""]
-        for apart in outcome.inapplicable:
-            lines.append(f"- {_flat(f'{apart.case}, {apart.where}, {apart.engine}: {apart.reason}')}")
-    if outcome.unjudged:
-        lines += ["", "## Offered, and judged by nothing", ""]
-        groups = grouped(outcome.unjudged)
-        lines += [f"- {_flat(str(group))}" for group in groups[:SHOWN]]
-        if len(groups) > SHOWN:
-            lines += [f"- ... and {len(groups) - SHOWN} more, in results.json."]
-    if outcome.unreferenced:
-        lines += ["", "## No stored reference", ""]
-        lines += [f"- {_flat(f'{case} {NO_REFERENCE.format(case)}')}" for case in outcome.unreferenced]
-    if outcome.broken:
-        lines += ["", "## Lines that are no records", "", *(f"- {_flat(line)}" for line in outcome.broken)]
+            where = f"{absence.case}, {absence.variant}, {absence.engine}{role_words(absence.role)}"
+            lines.append(f"- **{absence.status}** {_flat(f'{where}: {absence.reason}')}")
+    lines += _list(
+        "Not applicable", (f"{each.case}, {each.where}, {each.engine}: {each.reason}" for each in outcome.inapplicable)
+    )
+    lines += _list("Offered, and judged by nothing", map(str, grouped(outcome.unjudged)), "results.json")
+    lines += _list("No stored reference", (f"{case} {NO_REFERENCE.format(case)}" for case in outcome.unreferenced))
+    lines += _list("Lines that are no records", outcome.broken)
     write_whole(file, "\n".join(lines) + "\n")
-
-
-def _work(outcome: SessionOutcome) -> list[str]:
-    """What the finest runs took, up to `SHOWN` of them."""
-    if not outcome.work:
-        return []
-    lines = ["", "## Work of the finest runs", "", "| case | variant | engine | effort | work |"]
-    lines += ["|---|---|---|---|---|"]
-    for (case, variant, engine), work in list(outcome.main_work.items())[:SHOWN]:
-        cells = (case, variant, engine, work.effort, work.words(engine))
-        lines.append(f"| {' | '.join(map(_flat, cells))} |")
-    if len(outcome.main_work) > SHOWN:
-        lines += ["", f"... and {len(outcome.main_work) - SHOWN} more, in results.json."]
-    return lines
 
 
 def add_differences(differences: Differences, file: Path) -> None:
@@ -135,38 +101,53 @@ def add_differences(differences: Differences, file: Path) -> None:
 
 def _claims(outcome: SessionOutcome) -> list[str]:
     """Sections on goals looser than the cases', failures that the user expects, and claims that name nothing."""
-    lines = _table(
+    lines = _told(
         "Goals looser than the case's", outcome.loosened,
         lambda verdict: f"goal {verdict.goal:.2g} instead of {verdict.case_goal:.2g}: {verdict.goal_reason}",
     )  # fmt: skip
-    lines += _table(
+    lines += _told(
         "Failures that you expect", outcome.own_failures,
         lambda verdict: f"{verdict.status}: {verdict.expected_reason} ({verdict.own_failure})",
     )  # fmt: skip
-    if outcome.idle_claims:
-        lines += ["", "## Expectations that name nothing", "", *(f"- {_flat(claim)}" for claim in outcome.idle_claims)]
-    return lines
+    return lines + _list("Expectations that name nothing", outcome.idle_claims)
 
 
-def _table(title: str, verdicts: list[Verdict], say: Callable[[Verdict], str]) -> list[str]:
-    """A section with a row for each verdict, up to `SHOWN`; empty if there are none."""
-    if not verdicts:
+def _told(title: str, verdicts: Sequence[Verdict], say: Callable[[Verdict], str]) -> list[str]:
+    """A section with what there is to say of each verdict."""
+    return _section(title, ("what",), verdicts, lambda verdict: (_flat(say(verdict)),))
+
+
+def _section(
+    title: str, heads: Sequence[str], verdicts: Sequence[Verdict], cells: Callable[[Verdict], Sequence[str]]
+) -> list[str]:
+    """A section with a row for each verdict: where it is, and cells of its own."""
+    rows = [
+        (_flat(each.case), _flat(each.comparison), _code(each.channel), _flat(each.pair), *cells(each))
+        for each in verdicts
+    ]
+    return _table(("case", "comparison", "channel", "pair", *heads), rows, title, VERDICTS)
+
+
+def _unexpected(verdict: Verdict) -> tuple[str, str, str]:
+    return f"**{verdict.status}**", verdict.expected, _flat(verdict.reason)
+
+
+def _table(heads: Sequence[str], rows: Sequence[Sequence[str]], title: str = "", all_in: str = "") -> list[str]:
+    """A table, under a title if it has one; nothing if that has no rows, and up to `SHOWN` where a file has all."""
+    if title and not rows:
         return []
-    lines = ["", f"## {title}", "", "| case | comparison | channel | pair | what |", "|---|---|---|---|---|"]
-    for verdict in verdicts[:SHOWN]:
-        lines.append(f"| {' | '.join(_where(verdict))} | {_flat(say(verdict))} |")
-    if len(verdicts) > SHOWN:
-        lines += ["", f"... and {len(verdicts) - SHOWN} more, in verdicts.json."]
-    return lines
+    shown = rows[:SHOWN] if all_in else rows
+    lines = ["", f"## {title}", ""] if title else [""]
+    lines += [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|", *(f"| {' | '.join(row)} |" for row in shown)]
+    return [*lines, "", f"... and {len(rows) - SHOWN} more, in {all_in}."] if len(shown) < len(rows) else lines
 
 
-def _row(verdict: Verdict) -> str:
-    cells = *_where(verdict), f"**{verdict.status}**", verdict.expected, _flat(verdict.reason)
-    return f"| {' | '.join(cells)} |"
-
-
-def _where(verdict: Verdict) -> tuple[str, str, str, str]:
-    return _flat(verdict.case), _flat(verdict.comparison), _code(verdict.channel), _flat(verdict.pair)
+def _list(title: str, items: Iterable[str], all_in: str = "") -> list[str]:
+    """A list under a title; nothing without items, and up to `SHOWN` where a file has all."""
+    flat = [f"- {_flat(item)}" for item in items]
+    shown = flat[:SHOWN] if all_in else flat
+    more = [f"- ... and {len(flat) - SHOWN} more, in {all_in}."] if len(shown) < len(flat) else []
+    return ["", f"## {title}", "", *shown, *more] if flat else []
 
 
 def role_words(role: str) -> str:

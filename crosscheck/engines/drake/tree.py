@@ -38,8 +38,9 @@ from pydrake.multibody.tree import (
 from pydrake.systems.framework import Context
 
 from crosscheck.engines.conventions import Frame, rotation_matrix
+from crosscheck.engines.functions_of_time import initial
 from crosscheck.engines.links import Ball, Floating, Freedom, Link, Scalar, by_motion
-from crosscheck.engines.rigid_tree import Slot, scalar_start
+from crosscheck.engines.rigid_tree import Slot
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -121,7 +122,7 @@ def initial_state(tree: DrakeTree) -> DrakeState:
     for slot in tree.slots:
         match slot.freedom:
             case Scalar() as freedom:
-                q[slot.q], v[slot.v] = scalar_start(freedom)
+                q[slot.q], v[slot.v] = initial(freedom)
             case Ball() as freedom:
                 turned.append(slot.link.inboard.rotation @ rotation_matrix(freedom.quaternion))
                 v[slot.v : slot.v + 3] = freedom.angular_velocity

@@ -8,10 +8,10 @@ from scipy.spatial.transform import Rotation
 from crosscheck.engines.exudyn.assembly import Assembly
 from crosscheck.engines.exudyn.carriers import Carrier
 from crosscheck.engines.exudyn.joints import Stage
-from crosscheck.engines.exudyn.motion import initial
 from crosscheck.engines.exudyn.rotations import local_rate_map, logarithm
 from crosscheck.engines.exudyn.sections import BeamElement
 from crosscheck.engines.exudyn.state import CarrierPath, States, set_state
+from crosscheck.engines.functions_of_time import initial
 from flexmb.typing import Real
 
 Paths = dict[int, CarrierPath]

@@ -15,8 +15,7 @@ import numpy as np
 
 from crosscheck.engines.conventions import Frame, frame
 from crosscheck.engines.exudyn.carriers import Workshop
-from crosscheck.engines.exudyn.motion import initial
-from crosscheck.engines.functions_of_time import Profile, breaks, profile
+from crosscheck.engines.functions_of_time import Profile, breaks, initial, profile
 from flexmb.scene.freedoms import ScalarFreedom
 from flexmb.scene.functions import Function
 from flexmb.scene.hinges import Hinge, Planar, Revolute

@@ -14,8 +14,8 @@ import numpy as np
 
 from crosscheck.engines.conventions import axes_with
 from crosscheck.engines.exudyn.carriers import Carrier, Workshop
-from crosscheck.engines.exudyn.motion import FrameMotion, across, across_quaternion, initial
-from crosscheck.engines.functions_of_time import Profile, profile
+from crosscheck.engines.exudyn.motion import FrameMotion, across, across_quaternion
+from crosscheck.engines.functions_of_time import Profile, initial, profile
 from flexmb.scene.freedoms import Ball, Coordinate
 from flexmb.scene.hinges import WITH_AXIS, ClosureKind
 from flexmb.typing import Real

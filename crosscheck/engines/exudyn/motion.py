@@ -10,7 +10,7 @@ import numpy as np
 from crosscheck.engines.conventions import axis_rotation, rotation_matrix
 from crosscheck.engines.exudyn.modal import NodeShape
 from crosscheck.engines.exudyn.rotations import exponential, left_jacobian
-from crosscheck.engines.functions_of_time import profile
+from crosscheck.engines.functions_of_time import initial
 from flexmb.scene.freedoms import Ball, Coordinate, Floating
 from flexmb.typing import Real
 
@@ -65,14 +65,6 @@ class FrameMotion:
 
 
 AT_REST = FrameMotion(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
-
-
-def initial(coordinate: Coordinate) -> tuple[float, float]:
-    """Value and rate at t = 0: of the prescribed function where there is one, else the scene's initial values."""
-    if coordinate.prescribed is None:
-        return coordinate.value, coordinate.rate
-    start = profile(coordinate.prescribed)(0.0)
-    return start.value, start.rate
 
 
 def across(inboard: FrameMotion, axis: Real, coordinate: Coordinate) -> FrameMotion:

@@ -18,8 +18,9 @@ from crosscheck.engines.conventions import Frame, cross
 from crosscheck.engines.exudyn.carriers import Carrier, Workshop
 from crosscheck.engines.exudyn.joints import Stage
 from crosscheck.engines.exudyn.modal import NodeShape
-from crosscheck.engines.exudyn.motion import FrameMotion, initial
+from crosscheck.engines.exudyn.motion import FrameMotion
 from crosscheck.engines.exudyn.rotations import left_jacobian, turn_and_rate_map
+from crosscheck.engines.functions_of_time import initial
 from flexmb.scene.connectors import BetweenNodes, SpringDamper
 from flexmb.typing import Real
 

@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 
 from crosscheck.engines.beam_elements import between_stations, element_ends, shears
 from crosscheck.engines.conventions import Frame, axes_with, cross, frame, rotation_matrix
-from crosscheck.engines.functions_of_time import profile
-from flexmb.scene.freedoms import Coordinate, ScalarFreedom
+from crosscheck.engines.functions_of_time import initial
+from flexmb.scene.freedoms import ScalarFreedom
 from flexmb.scene.hinges import Hinge, Planar, Revolute, Weld
 from flexmb.scene.rest_curve import rest_sections
 from flexmb.scene.schema import BeamBody, Scene
@@ -105,14 +105,6 @@ def _beam(scene: Scene) -> BeamBody:
     beam = scene.bodies[0]
     assert isinstance(beam, BeamBody)
     return beam
-
-
-def initial(coordinate: Coordinate) -> tuple[float, float]:
-    """Value and rate at t = 0: of the prescribed function where there is one, else the scene's initial values."""
-    if coordinate.prescribed is None:
-        return coordinate.value, coordinate.rate
-    start = profile(coordinate.prescribed)(0.0)
-    return start.value, start.rate
 
 
 def _hinge_motion(hinge: Hinge) -> tuple[Frame, Real, float]:
