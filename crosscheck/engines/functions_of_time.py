@@ -41,8 +41,8 @@ def profile(function: Function, signals: Signals | None = None) -> Callable[[flo
     return _with_last_kept(_evaluated(function))
 
 
-class Moved(Protocol):
-    """A coordinate that a function of time may drive."""
+class CoordinateStart(Protocol):
+    """A coordinate with initial values, which a function of time may drive."""
 
     @property
     def value(self) -> float: ...
@@ -52,7 +52,7 @@ class Moved(Protocol):
     def prescribed(self) -> Function | None: ...
 
 
-def initial(coordinate: Moved) -> tuple[float, float]:
+def initial(coordinate: CoordinateStart) -> tuple[float, float]:
     """Value and rate at t = 0: of the prescribed function where there is one, else the scene's initial values."""
     if coordinate.prescribed is None:
         return coordinate.value, coordinate.rate

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.linalg import null_space
 
 from crosscheck.engines.exudyn.assembly import Assembly
-from crosscheck.engines.exudyn.library import Equations, accelerations, equations
+from crosscheck.engines.exudyn.library import ExudynEquations, accelerations, equations
 from crosscheck.engines.exudyn.state import States, set_state
 from crosscheck.engines.linear.frequencies import eigenfrequencies
 from crosscheck.engines.linear.matrices import EPS, Errors, LinearMatrices, differentiated, norm
@@ -43,7 +43,7 @@ def frequencies(assembly: Assembly, states: States) -> LinearOutputs:
     return LinearOutputs({}, rows, {FREQUENCIES: doubts})
 
 
-def _at(assembly: Assembly, system: Equations, states: States, sample: int) -> LinearMatrices | None:
+def _at(assembly: Assembly, system: ExudynEquations, states: States, sample: int) -> LinearMatrices | None:
     """The matrices of the motions Z that are allowed; None unless the state is an equilibrium."""
     set_state(assembly.shop.mbs, states, sample)
     if system.k:

@@ -39,7 +39,7 @@ def matrix(values: Real):
     return container
 
 
-class Equations:
+class ExudynEquations:
     """The equations of a system by Exudyn's implicit solver, at its current coordinates unless others are given:
     M a + C' multipliers = f for n coordinates and k constraints of Jacobian C."""
 
@@ -85,7 +85,7 @@ def accelerations(M: Real, f: Real, C: Real, kept: Real) -> tuple[Real, Real]:
 
 
 @contextmanager
-def equations(mbs: Any) -> Iterator[Equations]:
+def equations(mbs: Any) -> Iterator[ExudynEquations]:
     """The equations of a system at its initial state; Exudyn's solver is finalised whatever happens."""
     exudyn = load()
     settings = exudyn.SimulationSettings()
@@ -94,6 +94,6 @@ def equations(mbs: Any) -> Iterator[Equations]:
     solver = exudyn.MainSolverImplicitSecondOrder()
     solver.InitializeSolver(mbs, settings)
     try:
-        yield Equations(mbs, solver)
+        yield ExudynEquations(mbs, solver)
     finally:
         solver.FinalizeSolver(mbs, settings)
