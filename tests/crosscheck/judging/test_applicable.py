@@ -3,7 +3,7 @@
 What the motion leaves open is compared with nothing; what that is, no engine decides.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -21,10 +21,7 @@ from crosscheck.records.packing import pack, unpack
 from crosscheck.report.ci import write_summary
 from crosscheck.report.junit import write_junit
 from crosscheck.terminal.text import Verbosity
-from tests.crosscheck.fake_engines import Fake, Pendulum
-from tests.crosscheck.fake_engines import engines as fakes
 from tests.crosscheck.made_records import ONE_PAIR, PAIR, TIP, ended, judged, ladder, told, way
-from tests.crosscheck.sessions import compare_engines
 from tests.flexmb.closure import mechanisms
 
 VELOCITY = "marker:tip.velocity"
@@ -369,43 +366,3 @@ def test_numbers_that_are_none_must_be_named(run):
         checked_run(replace(found, undetermined=()), times, scene)
     with pytest.raises(BrokenContract, match="channels of loads and drives"):
         checked_run(replace(found, undetermined=("energy.kinetic",)), times, scene)
-
-
-@dataclass
-class Claiming(Pendulum):
-    """A pendulum, a tree, of which this engine says that its loads are undetermined; `void`: they are NaN."""
-
-    void: bool = False
-
-    def simulate(self, run, effort):
-        found = super().simulate(run, effort)
-        loads = {name: np.full_like(load, np.nan) if self.void else load for name, load in found.loads.items()}
-        named = tuple(f"load:{name}.{part}" for name in loads for part in ("torque", "force"))
-        return replace(found, loads=loads, undetermined=named)
-
-
-class Claimer(Fake):
-    def __init__(self, name, void):
-        super().__init__(name)
-        self.void = void
-
-    def compile(self, scene):
-        return Claiming(scene, void=self.void)
-
-
-def with_claimers():
-    return {**fakes(), "claimer": Claimer("claimer", False), "void": Claimer("void", True)}
-
-
-@pytest.mark.parametrize("claimer", ["claimer", "void"])
-def test_a_claim_on_a_tree_fails_its_author_and_moves_no_other_verdict(tmp_path: Path, claimer):
-    one, other = list(fakes())[:2]
-    goals = '"marker:tip.position" = 1e-3, load = 1e-3'
-    provider = f"{__name__}:with_claimers"
-    alone = compare_engines(tmp_path / "alone", (one, other), goals, provider=provider)
-    beside = compare_engines(tmp_path / "beside", (one, other, claimer), goals, provider=provider)
-    theirs = [each for each in beside.all if claimer not in (each.engine_a, each.engine_b)]
-    assert {each.channel for each in theirs} > {TIP} and theirs == alone.all and not beside.inapplicable
-    its_own = [each for each in beside.all if each not in theirs]
-    assert its_own and {each.status for each in its_own} == {"failed"} and not beside.ok
-    assert all("load:" in each.reason and "no closures or couplings" in each.reason for each in its_own)

@@ -120,14 +120,6 @@ def test_a_refined_run_without_result_leaves_the_uncertainty_unknown(status: str
     assert status is None or f"{status}: " in verdict.reason and "no memory left" in verdict.reason
 
 
-def test_a_refined_run_that_is_not_refined_or_lacks_the_channel_says_nothing() -> None:
-    coarse, exact = ladder("one", {TIP: way()}, variant="coarse"), ladder("two", {TIP: way()}, variant="exact")
-    same = msgspec.structs.replace(coarse[-1], role="refined")
-    assert "the very same result" in single(judged(ACROSS, [*coarse, *exact, same])).reason
-    other = ladder("one", {"energy.total": way()[:, :1]}, variant="coarse", role="refined")[-1]
-    assert "does not offer the channel" in single(judged(ACROSS, [*coarse, *exact, other])).reason
-
-
 def test_within_a_variant_the_refined_run_does_not_matter() -> None:
     text = ACROSS.replace('engines = ["one"]', 'engines = ["one", "two"]').split("[[comparison]]")[0]
     text += '[[comparison]]\nname = "both"\nvariant = "coarse"\ngoals = { "marker:tip.position" = 1e-3 }\n'
@@ -168,15 +160,6 @@ def test_an_engine_may_not_pass_over_efforts(efforts: dict[int, str | None], sta
     assert (verdict.status, verdict.ok, said in verdict.reason) == (status, False, True), verdict.reason
     if status != "unresolved":
         assert set(re.findall("no memory of .", verdict.reason)) == {f"no memory of {max(efforts)}"}
-
-
-def test_an_effort_too_coarse_to_be_followed_is_left_out() -> None:
-    """The difference of the other two counts, with the factor of an order that was not seen."""
-    one, two = ladder("one", {TIP: way()}), ladder("two", {TIP: way()})
-    one[0] = ended(one[0], "diverged")
-    verdict = single(judged(ONE_PAIR, [*one, *two]))
-    assert verdict.status == "agree"
-    assert np.isclose(verdict.U, 3 * 9e-6 + 3 * 9e-6, rtol=1e-3)
 
 
 def test_efforts_of_another_ladder_do_not_count() -> None:
@@ -221,31 +204,9 @@ def test_a_run_without_result_gives_its_status_to_the_verdict(status: str) -> No
     assert "two on rigid" in verdict.reason and "so it was" in verdict.reason
 
 
-@pytest.mark.parametrize("what", ["scales", "band"])
-def test_a_pattern_that_names_nothing_judged_is_not_left_out_in_silence(what: str) -> None:
-    value = "2.0" if what == "scales" else "[1e-6, 1e-5]"
-    text = ONE_PAIR + f'{what} = {{ "marker:top.position" = {value} }}\n'
-    text += 'expect = "differ"\nreason = "so"\n' if what == "band" else ""
-    last = judged(text, PAIR).all[-1]
-    assert (last.channel, last.status, last.ok) == ("marker:top.position", "unresolved", False)
-    assert [each.channel for each in judged(text.replace("top", "tip"), PAIR).all] == [TIP]
-
-
 def test_a_scale_replaces_the_range_where_its_pattern_is_the_most_specific() -> None:
     text = ONE_PAIR + 'scales = { "marker" = 5.0, "marker:tip.position" = 100.0 }\n'
     assert single(judged(text, PAIR)).scale == 100.0
-
-
-@pytest.mark.parametrize(
-    ("times", "values"),
-    [(TIMES, way()[:5]), (TIMES[:5], way()), (TIMES, way()[:, 0]), (TIMES[:0], way()[:0]), (TIMES[:, None], way())],
-)
-def test_a_record_that_does_not_fit_together_failed(times: np.ndarray, values: np.ndarray) -> None:
-    two = ladder("two", {TIP: way()})
-    two[-1] = msgspec.structs.replace(two[-1], times=pack(times), channels={TIP: pack(values)})
-    assert single(judged(ONE_PAIR, [*ladder("one", {TIP: way()}), *two])).status == "failed"
-    without = msgspec.structs.replace(two[-1], times=None)
-    assert single(judged(ONE_PAIR, [*ladder("one", {TIP: way()}), *two[:-1], without])).status == "failed"
 
 
 def test_a_control_across_variants_counts_the_spatial_uncertainty() -> None:

@@ -14,7 +14,7 @@ from crosscheck.judging.case_verdicts import outside
 from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.judging.question import Question
 from crosscheck.judging.verdict import Ending, Finding
-from crosscheck.library.case import Comparison, Conservation
+from crosscheck.library.case import Comparison
 from crosscheck.library.claims import ClaimedEfforts, ClaimedFailure, ClaimedGoals, Claims
 from crosscheck.records.kinds import RunRecord
 from crosscheck.records.packing import pack
@@ -247,13 +247,6 @@ def test_an_expected_lack_of_resolution_is_bounded_too() -> None:
     for band, ok in (("1e-5, 1e-4", True), ("1e-7, 1e-6", False), ("1e-3, 1e-2", False)):
         verdict = single(judged(text.replace("BAND", band), PAIR))
         assert (verdict.status, verdict.ok) == ("unresolved", ok)
-
-
-def test_a_drift_has_its_band() -> None:
-    item = Conservation(variant="v", quantity="energy", limit=1e-9, expect="differ", band=(1e-7, 1e-6), reason="so")
-    assert outside(item, "energy.total", Finding("differ", "drifts", 2e-7)) == ""
-    assert outside(item, "energy.total", Finding("differ", "drifts", 2e-5))
-    assert outside(msgspec.structs.replace(item, band=None), "energy.total", Finding("differ", "drifts", 2e-7))
 
 
 def test_bounds_are_total() -> None:

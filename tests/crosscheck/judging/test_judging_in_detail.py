@@ -257,24 +257,6 @@ engines = ["one"]
     assert np.isclose(extra[-1], 1.25 * 1.5 * 0.01, rtol=1e-3)
 
 
-def test_what_the_uncertainty_lacks_is_named() -> None:
-    runs = ladder("one", {TIP: way()})
-    assert result(ONE_PAIR, runs[1:]).doubt(TIP, False).how == "unknown: effort 1 of 3 is not recorded"
-    without = msgspec.structs.replace(runs[1], channels={})
-    how = result(ONE_PAIR, [runs[0], without, runs[2]]).doubt(TIP, False).how
-    assert how == "unknown: effort rtol=1 does not offer the channel"
-
-
-@pytest.mark.parametrize(("status", "said"), [("refused", "was refused"), ("crashed", "crashed"), ("failed", "failed")])
-def test_the_effort_that_an_engine_failed_is_named(status: str, said: str) -> None:
-    runs = ladder("one", {TIP: way()})
-    ended = msgspec.structs.replace(runs[1], status=status, message="no")
-    of_all, cut = result(ONE_PAIR, [runs[0], ended, runs[2]]), result(ONE_PAIR, [runs[0], ended])
-    assert [(each.status, each.message) for each in (of_all, cut)] == [
-        ("failed" if status == "refused" else status, f"effort rtol=1 {said}: no")
-    ] * 2
-
-
 def test_efforts_that_did_the_same_work_with_the_same_result_are_one() -> None:
     runs = ladder("one", {TIP: way()})
     same = msgspec.structs.replace(runs[1], channels=runs[2].channels, evaluations=runs[2].evaluations)

@@ -177,39 +177,8 @@ def test_uncertainty_is_not_idle_caution(ratios: dict[str, Real], kind: str, idl
     assert np.median(ratios[kind]) <= idle
 
 
-@pytest.mark.parametrize("name", METHODS)
-def test_observed_order_of_known_methods(name: str) -> None:
-    order, step = METHODS[name]
-    problem = Logistic(np.random.default_rng(5))
-    runs = [march(problem, step, 16 * 2**n) for n in range(3)]
-    wider, gap = (float(np.max(np.abs(a - b))) for a, b in zip(runs, runs[1:], strict=False))
-    assert observed_order([4.0, 2.0, 1.0], wider, gap) == pytest.approx(order, abs=0.1)
-
-
-def test_order_with_unequal_ratios() -> None:
-    """f(h) = C h^3 with ratios 3 and 1.5 gives back the order 3."""
-    values = [h**3 for h in (0.9, 0.3, 0.2)]
-    order = observed_order((0.9, 0.3, 0.2), values[0] - values[1], values[1] - values[2])
-    assert order == pytest.approx(3.0, abs=1e-9)
-
-
 def signal(size: float) -> Real:
     return size * np.ones((5, 3)) * np.linspace(0.0, 1.0, 5)[:, None]
-
-
-def test_one_effort_leaves_the_uncertainty_unknown() -> None:
-    assert estimate(CHANNEL, "step", [RungSignal(0.1, signal(1.0), 10)], 1.0).value == np.inf
-
-
-def test_runs_that_do_not_converge_get_the_larger_difference() -> None:
-    rungs = [RungSignal(0.4, signal(1.0)), RungSignal(0.2, signal(1.5)), RungSignal(0.1, signal(0.9))]
-    assert estimate(CHANNEL, "step", rungs, 0.0).value == pytest.approx(3.0 * 0.6 * np.sqrt(3.0))
-
-
-def test_equal_runs_keep_the_roundoff_floor() -> None:
-    rungs = [RungSignal(10.0**-n, signal(1.0), 400) for n in (8, 9, 10)]
-    eps = np.finfo(float).eps
-    assert estimate(CHANNEL, "tolerance", rungs, 2.0).value == pytest.approx(2.0 * 20.0 * eps)
 
 
 @pytest.mark.parametrize("joints", [2, 10, 100, 1000])
@@ -262,21 +231,6 @@ def test_a_result_counts_the_joints_that_it_has_loads_of() -> None:
         ).cases[0].results.values()
         expected = roundoff_floor(np.sqrt(3.0), 300, counted[at])
         assert result.uncertainty(names[0]).value == pytest.approx(expected, rel=1e-12)
-
-
-def test_envelope_never_falls() -> None:
-    wave = np.sin(np.linspace(0.0, 20.0, 81))[:, None]
-    rungs = [RungSignal(h, wave * (1.0 + h**2)) for h in (0.4, 0.2, 0.1)]
-    envelope = estimate(CHANNEL, "step", rungs, 1.0).envelope
-    assert np.all(np.diff(envelope) >= 0.0)
-
-
-def test_spatial_uncertainty_bounds_a_second_order_error() -> None:
-    """f_n = f + C/n^2: U of n = 16 from n = 32 is 1.25 times its error."""
-    exact = signal(1.0)
-    coarse, fine = (exact * (1.0 + 0.9 / n**2) for n in (16, 32))
-    bound = spatial(CHANNEL, coarse, fine, 2.0, 2.0)[-1]
-    assert bound == pytest.approx(1.25 * np.max(np.linalg.norm(coarse - exact, axis=1)), rel=1e-10)
 
 
 FORCE = "load:pivot.force"

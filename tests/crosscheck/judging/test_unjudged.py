@@ -284,10 +284,3 @@ scales = { "marker:top.position" = 1.0 }
     (without,) = (each for each in judged(ONE_PAIR + control, [*PAIR[:3], faulty]).all if each.kind == "control")
     assert (without.channel, without.status) == (TIP, "did not run")
     assert judged(ONE_PAIR + control.replace("top", "tip"), [*PAIR, faulty]).ok
-
-
-def test_a_run_that_finished_at_no_effort_is_a_failure() -> None:
-    """A damaged record: there is nothing to compare, and there was a traceback."""
-    damaged = msgspec.structs.replace(ladder("two", {TIP: way()})[-1], effort="", times=None, channels={})
-    outcome = judged(ONE_PAIR, [*ladder("one", {TIP: way()}), damaged])
-    assert not outcome.ok and "its record names no effort" in outcome.all[0].reason
