@@ -37,61 +37,6 @@ def test_the_documented_example_is_valid() -> None:
     check_run_file(example())
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        (
-            'a = { variant = "full"',
-            'a = { variant = "fool"',
-            'no variant "fool"; the variants are rigid, full, segments',
-        ),
-        ('engine = "native" }\nb', 'engine = "exudyn" }\nb', 'engine "exudyn" does not run variant "full"'),
-        ('reason = "above the critical speed the unstiffened body diverges"', "", "needs a reason"),
-        ("segments = 16", "", r"\$.variant\[2\].segments"),
-        ('transform = "segments"', "", r"\$.variant\[2\].segments"),
-        ('transform = "segments"', 'transform = "substructures"', r"\$.variant\[2\].segments .*: give it exactly"),
-        ('engines = ["native"]', 'pieces = 2\nengines = ["native"]', r"\$.variant\[1\].pieces .*: give it exactly"),
-        ("refined = { segments = 32 }", "refined = { pieces = 32 }", r"\$.variant\[2\].refined.pieces"),
-        ('scene = "flexible.toml"', "eigenmodes = 1", r"\$.variant\[1\].eigenmodes"),
-        ('scene = "flexible.toml"', 'split_body = "a"', r"\$.variant\[1\].split_body"),
-        ('engines = ["native"]', "engines = []", "name at least one engine"),
-        ('also = ["native-frisch"]', 'also = ["native"]', r"\$.variant\[1\].also .*: native is among"),
-        ('name = "full"', 'name = "rigid"', "two variants have the same name"),
-        ('reference = "rigid"', 'reference = "stiff"', 'no variant "stiff"'),
-        ("duration_s = 10.0", "duration_s = 0.0", "needs a duration"),
-        ("duration_s = 10.0", "duration_s = 10.0\ntime_limit_s = 0", r"\$.time_limit_s: 0 makes no sense"),
-        ("duration_s = 10.0", "duration_s = 10.0\ntime_limit_s = nan", r"\$.time_limit_s"),
-        ("duration_s = 10.0", "duration_s = 10.0\ntime_limit_s = inf", r"\$.time_limit_s"),
-        ('b = { variant = "rigid", engine = "pinocchio" }', 'b = { variant = "rigid", engine = "adams" }', "adams"),
-        ('goals = { "marker:tip.position" = 1e-6 }', "goals = {}", "at least one channel"),
-    ],
-)
-def test_faulty_run_files_are_refused(tmp_path: Path, old: str, new: str, message: str) -> None:
-    assert old in EXAMPLE
-    folder = copy_case(tmp_path)
-    (folder / "run.toml").write_text(EXAMPLE.replace(old, new, 1), encoding="utf-8")
-    with pytest.raises(CaseError, match=message) as refusal:
-        load_case(folder)
-    assert "run.toml" in str(refusal.value)
-
-
-@pytest.mark.parametrize(
-    ("line", "place"),
-    [("samples = 81", "samples"), ("duration = 3", "duration"), ('name = "rigid"\nengine = "x"', "engine")],
-)
-def test_unknown_keys_and_types_name_their_place(tmp_path: Path, line: str, place: str) -> None:
-    folder = copy_case(tmp_path)
-    text = (folder / "run.toml").read_text(encoding="utf-8")
-    changed = {
-        "samples": text.replace("samples = 81", 'samples = "many"'),
-        "duration": "duration = 3\n" + text,
-        "engine": text.replace('name = "rigid"', line, 1),
-    }[place]
-    (folder / "run.toml").write_text(changed, encoding="utf-8")
-    with pytest.raises(CaseError, match=place):
-        load_case(folder)
-
-
 def test_missing_scene_and_unknown_case_say_what_to_do(tmp_path: Path) -> None:
     folder = copy_case(tmp_path)
     (folder / "scene.toml").unlink()
