@@ -1,6 +1,5 @@
 """Whole runs of real scenes: conservation, closed forms, failing runs, settings, files."""
 
-import csv
 import math
 import tracemalloc
 
@@ -206,26 +205,6 @@ def test_the_memory_of_outputs_is_what_is_reckoned_with():
         tracemalloc.stop()
     assert run.finished
     assert 0.25 < (taken[1] - taken[0]) / (200 * sample_bytes(system)) <= 1.0
-
-
-def test_a_profile_must_cover_the_run():
-    profile = fm.Table(times_s=tuple(np.linspace(0.0, 1.0, 8)), values=(0.0,) * 8)
-    scene = pendulum(prescribed=profile)
-    assert fm.simulate(scene, 1.0, samples=3).finished
-    with pytest.raises(fm.SceneError, match="extend the table, or shorten the run"):
-        fm.simulate(scene, 1.5)
-
-
-def test_csv_names_units_and_reads_back_exactly(tmp_path):
-    run = fm.simulate(driven_arm(), 1.0, samples=5)
-    run.to_csv(tmp_path / "run.csv")
-    with (tmp_path / "run.csv").open(newline="") as file:
-        header, *rows = csv.reader(file)
-    assert len(set(header)) == len(header)
-    assert {"t [s]", "drive.rotation [rad]", "end.position.x [m]", "elbow.torque.y [N m]", "work [J]"} <= set(header)
-    values = np.array(rows, float)
-    assert np.array_equal(values[:, header.index("end.position.z [m]")], run.markers["end"].position[:, 2])
-    assert np.array_equal(values[:, header.index("energy.total [J]")], run.total_energy)
 
 
 def test_of_many_curves_a_chart_has_the_largest_and_says_so():

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,7 +13,7 @@ from flexmb.scene.build import SceneBuilder
 from flexmb.scene.functions import Sine
 from flexmb.system.system import System
 from tests import trees
-from tests.bounds import algebra, relative
+from tests.bounds import algebra
 
 RECIPE = replace(trees.MIXED, bodies=5)
 SEED = 50
@@ -109,91 +105,3 @@ def test_evaluation_repeats_the_single_questions(system):
     for marker in seen.markers.values():
         assert np.linalg.det(marker.rotation) == pytest.approx(1.0)
         assert np.linalg.norm(marker.quaternion) == pytest.approx(1.0)
-
-
-def test_one_evaluation_leaves_nothing_behind_for_the_next(system):
-    """The workspace is overwritten, never accumulated into."""
-    state = system.initial_state
-    first = system.accelerations(state)
-    other = system.state(state.q, state.u + 1.0)
-    system.mass_matrix(other), system.bias(other), system.evaluate(0.0, other.q, other.u)
-    assert np.array_equal(system.accelerations(state), first)
-
-
-# Without the compiler records have no attributes: `Rows` and `Row` give them some. The statements are the kernels' own.
-INTERPRETED = """
-import sys
-from dataclasses import fields, replace
-from types import SimpleNamespace
-import numba
-import numpy as np
-import flexmb.jit.direct as direct
-import flexmb.jit.kernel as making
-
-making.HOOKS = replace(making.HOOKS, keep=lambda compiled, function: None)
-numba.config.DISABLE_JIT = 1  # from here on: the package refuses to be without its compiler
-def addresses(function, returned, *given):
-    return function, *(each for each in given if not isinstance(each, numba.types.Type))
-
-direct.addresses = addresses
-direct.settled = lambda function, *kinds: function
-import flexmb
-from tests.flexmb.system.test_system import RECIPE, SEED, numbers
-from tests.trees import random_scene
-
-class Row:
-    def __init__(self, record):
-        object.__setattr__(self, "record", record)
-    def __getattr__(self, name):
-        return self.record[name]
-    def __getitem__(self, name):
-        return self.record[name]
-    def __setattr__(self, name, value):
-        self.record[name] = value
-
-class Rows:
-    def __init__(self, array):
-        self.array, self.shape = array, array.shape
-    def __len__(self):
-        return len(self.array)
-    def __getitem__(self, key):
-        found = self.array[key]
-        if isinstance(found, np.void):
-            return Row(found)
-        return Rows(found) if found.dtype.names else found
-
-def records(bundle):
-    arrays = {field.name: getattr(bundle, field.name) for field in fields(bundle)}
-    named = {name: Rows(array) if array.dtype.names else array for name, array in arrays.items()}
-    return SimpleNamespace(_numba_type_=bundle._numba_type_, **named)
-
-system = flexmb.compile(random_scene(SEED, RECIPE))
-system.constants = system.recursion_constants = records(system.constants)
-system.own_workspace = system.own_recursion_workspace = records(system.own_workspace)
-np.save(sys.argv[1], numbers(system))
-"""
-
-
-def numbers(system: System) -> np.ndarray:
-    """Everything one evaluation gives, each part in units of its largest entry."""
-    state = system.initial_state
-    seen = system.evaluate(state.t, state.q, state.u)
-    motions = [np.concatenate([m.position, m.velocity]) for m in seen.markers.values()]
-    parts = [
-        system.mass_matrix(state), system.bias(state), seen.accelerations, np.array(list(seen.energy.values())),
-        seen.momentum, np.array(list(seen.loads.values())), np.array(motions),
-    ]  # fmt: skip
-    return np.concatenate([np.ravel(part) / np.max(np.abs(part)) for part in parts])
-
-
-def test_interpreted_equals_compiled(system, tmp_path):
-    """The compiler fuses products and sums, so the last digits may differ, and nothing else."""
-    root = Path(__file__).parents[3]
-    paths = os.pathsep.join([str(root), os.environ.get("PYTHONPATH", "")])
-    subprocess.run(
-        [sys.executable, "-c", INTERPRETED, str(tmp_path / "numbers.npy")], check=True, cwd=root,
-        env=os.environ | {"PYTHONPATH": paths},
-    )  # fmt: skip
-    condition = np.linalg.cond(system.mass_matrix(system.initial_state))
-    bound = algebra(system.nu, len(system.body_names), 15)
-    assert relative(np.load(tmp_path / "numbers.npy"), numbers(system)) <= bound * condition
