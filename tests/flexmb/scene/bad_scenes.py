@@ -10,7 +10,7 @@ from flexmb.scene.convert import to_struct
 from flexmb.scene.modal_data import inertia_points
 from flexmb.scene.shapes import beam_section, cuboid_inertia
 
-NAN, INF = float("nan"), float("inf")
+NAN = float("nan")
 BALL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 NONE = ((0.0, 0.0, 0.0),) * 3
 TABLE = {"kind": "table", "times_s": [0.0, 1.0, 2.0, 3.0, 4.0, 5.0], "values": [0.0, 0.1, 0.3, 0.6, 0.8, 0.9]}
@@ -147,8 +147,6 @@ BAD = {
                                    ['no coordinate "rotations[2]"', "rotations[0], rotations[1]"], ["name a hinge"]),
     "coupling without ratio": (put("couplings", 0, "terms", 0, "ratio", 0.0), ["$.couplings[0].terms[0].ratio"],
                                ["zero"], ["leave"]),
-    "coupling with an infinite ratio": (put("couplings", 0, "terms", 0, "ratio", INF),
-                                        ["$.couplings[0].terms[0].ratio"], ["inf"], ["finite"]),
     "coupling with itself": (put("couplings", 0, "terms", [{"hinge": "rail", "ratio": 0.5}]), ["$.couplings[0]"],
                              ['"translation" of hinge "rail" is named twice'], ["once"]),
     "coupling of nothing": (put("couplings", 0, "terms", []), ["$.couplings[0].terms"], ["no coordinate leads"],
@@ -171,23 +169,14 @@ BAD = {
         ["$.bodies"], ["no body"], ["add"]),
     # numbers
     "NaN": (put("bodies", 0, "com_m", 1, NAN), ["$.bodies[0].com_m[1]", 'body "hub"'], ["nan"], ["finite"]),
-    "infinite gravity": (put("gravity_m_s2", 2, -INF), ["$.gravity_m_s2[2]"], ["-inf"], ["finite"]),
-    "NaN in a profile": (put("hinges", 1, "rotation", "prescribed_rad", "values", 2, NAN),
-                         ["$.hinges[1].rotation.prescribed_rad.values[2]"], ["nan"], ["finite"]),
     "unnormalised quaternion": (put("hinges", 1, "child_quaternion", [1.0, 0.0, 0.0, 0.1]),
                                 ["$.hinges[1].child_quaternion"], ["norm is 1.00"], ["write (0.99"]),
-    "unnormalised initial quaternion": (put("hinges", 0, "quaternion", [2.0, 0.0, 0.0, 0.0]),
-                                        ["$.hinges[0].quaternion"],
-                                        ["norm is 2"], ["(1.0, 0.0, 0.0, 0.0)"]),
     "zero quaternion": (put("bodies", 0, "nodes", 0, "quaternion", [0.0] * 4),
                         ["$.bodies[0].nodes[0].quaternion", 'node "flange"'], ["zero"], ["(1, 0, 0, 0)"]),
     "zero axis": (put("hinges", 4, "axis", [0.0] * 3), ["$.hinges[4].axis"], ["zero"], ["unit vector"]),
     "axis not a unit vector": (put("wheels", 0, "axis", [0.0, 3.0, 4.0]), ["$.wheels[0].axis"], ["length is 5"],
                                ["(0.0, 0.6, 0.8)"]),
-    "load direction not a unit vector": (put("loads", 0, "direction", [1.0, 1.0, 0.0]), ["$.loads[0].direction"],
-                                         ["1.414"], ["0.707"]),
     # rigid bodies
-    "negative mass": (put("bodies", 2, "mass_kg", -2.0), ["$.bodies[2].mass_kg"], ["negative"], ["at least zero"]),
     "inertia without mass": (put("bodies", 2, "mass_kg", 0.0), ["$.bodies[2].mass_kg"], ["inertia"], ["give its mass"]),
     "unsymmetric inertia": (put("bodies", 2, "inertia_kg_m2", 0, 1, 0.1), ["$.bodies[2].inertia_kg_m2"],
                             ["not symmetric", "[0][1]"], ["both sides"]),
@@ -210,17 +199,11 @@ BAD = {
     "stations short of the tip": (put(*STATION, "x_m", 2.5), ["$.bodies[1].stations"], ["2.5"], ["x_m = 3.0"]),
     "unsorted stations": (lambda data: data["bodies"][1]["stations"].reverse(), ["$.bodies[1].stations"],
                           ["order"], ["sort"]),
-    "no bending stiffness": (put(*STATION, "EIy_Nm2", 0.0), ["$.bodies[1].stations[1].EIy_Nm2"], ["0"], ["positive"]),
-    "no mass per length": (put(*STATION, "mass_per_length_kg_m", 0.0), ["stations[1].mass_per_length_kg_m"], [],
-                           ["posit"]),
-    "negative rotary inertia": (put(*STATION, "rotary_y_kg_m", -1.0), ["stations[1].rotary_y_kg_m"], ["-1"], ["zero"]),
     "Timoshenko without shear stiffness": (both(put("bodies", 1, "theory", "timoshenko"), put(*STATION, "GAy_N", None)),
                                            ["$.bodies[1].stations[1]"], ["GAy_N"], ["euler-bernoulli"]),
     "node off the beam": (put("bodies", 1, "nodes", 0, "x_m", 3.5), ["nodes[0].x_m"], ["3.5"], ["<= 3"]),
     "tip mass off the beam": (put("bodies", 1, "tip_masses", [LUMP | {"x_m": -1.0}]), ["tip_masses[0].x_m"], [],
                               ["<= 3"]),
-    "tip mass without mass": (put("bodies", 1, "tip_masses", [LUMP | {"mass_kg": 0.0}]), ["tip_masses[0].mass_kg"],
-                              ["zero"], ["positive"]),
     "impossible tip inertia": (put("bodies", 1, "tip_masses", [LUMP | {"inertia_kg_m2": np.diag([1, 1, 3]).tolist()}]),
                                ["tip_masses[0].inertia_kg_m2"], ["triangle"], ["add up"]),
     "no modes": (both(put(*MODES, "count", 0), STATELESS), ["$.bodies[1].modes.count"], ["0 modes"], ["rigid"]),
@@ -289,10 +272,6 @@ BAD = {
                           ["jumps"], ["smooth_step"]),
     "impossible wheel": (put("wheels", 0, "transverse_inertia_kg_m2", 0.04), ["transverse_inertia_kg_m2", "spinner"],
                          ["twice"], ["0.05"]),
-    "wheel without spin inertia": (put("wheels", 0, "axial_inertia_kg_m2", 0.0), ["axial_inertia_kg_m2"], ["0"],
-                                   ["posit"]),
-    "point mass without mass": (put("point_masses", 0, "mass_kg", 0.0), ["$.point_masses[0].mass_kg"], ["zero"],
-                                ["positive"]),
     "directions not orthogonal": (put("point_masses", 0, "directions", 1, [0.6, 0.8, 0.0]),
                                   ["$.point_masses[0].directions"],
                                   ["not orthogonal"], ["orthonormal"]),
@@ -314,8 +293,6 @@ BAD = {
     "table values do not match": (put("loads", 0, "function", TABLE | {"values": [0.0]}),
                                   ["$.loads[0].function.values"],
                                   ["6 times but 1 values"], ["each time"]),
-    "no duration": (put("loads", 0, "function", "duration_s", 0.0), ["$.loads[0].function.duration_s"], ["0 s"],
-                    ["posit"]),
     # inertia beyond hinges
     "massless tip": (hang(MASSLESS, "revolute"), ['hinge "extra"'], ['"ghost"', "inertia about"],
                      ["weld", "prescribe"]),
@@ -370,10 +347,6 @@ DOUBTFUL = {
     "negative stiffness": (put("hinges", 2, "rotations", 0, "stiffness_Nm_rad", -1.0),
                            ["$.hinges[2].rotations[0].stiffness_Nm_rad", '"cardan"'], ["negative stiffness"], ["zero"],
                            "negative_stiffness"),
-    "negative damping": (put("hinges", 4, "translation", "damping_Ns_m", -1.0),
-                         ["$.hinges[4].translation.damping_Ns_m"], ["negative damping"], ["zero"], "negative_damping"),
-    "negative bearing friction": (put("wheels", 0, "friction_Nms_rad", -0.1), ["$.wheels[0].friction_Nms_rad"],
-                                  ["negative friction"], ["zero"], "negative_damping"),
     "a port inside a piece": (
         both(put("bodies", 1, "level", "exact"), put(*MODES, "families", ["bending_y"]),
              put(*MODES, "cuts", []), put("hinges", 2, "parent_node", "middle")),
