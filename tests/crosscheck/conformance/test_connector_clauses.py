@@ -88,14 +88,6 @@ def test_every_clause_has_its_fault() -> None:
     assert set(FAULTS) == set(NAMES)
 
 
-@pytest.mark.parametrize("code, name", [(code, name) for code in ("mujoco", "exudyn") for name in NAMES[:-1]])
-def test_peers_keep_it(code: str, name: str) -> None:
-    """But for the last, on the work done, which they do not integrate."""
-    pytest.importorskip(code)
-    found = try_clause(engine(code), CLAUSES[name])
-    assert found.status == "holds", found.message
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_a_faulty_adapter_breaks_it(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("pinocchio")
@@ -105,9 +97,3 @@ def test_a_faulty_adapter_breaks_it(name: str, monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(connections, part, fault(getattr(connections, part)))
     found = try_clause(engine("pinocchio"), CLAUSES[name])
     assert found.status == "broken" and (" must be " in found.message or " is off by " in found.message), found.message
-
-
-@pytest.mark.filterwarnings("ignore:.*is doubtful")
-def test_native_keeps_all_of_them() -> None:
-    found = [try_clause(engine("native"), clause) for clause in CONNECTORS.clauses]
-    assert {each.clause: each.message for each in found if each.status != "holds"} == {}

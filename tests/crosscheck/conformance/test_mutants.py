@@ -109,15 +109,6 @@ def test_the_small_adapter_keeps_the_whole_contract() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["native", "pinocchio", "mujoco", "exudyn", "drake", "dart", "opensim"])
-def test_engines_keep_the_clauses_on_trees(name: str) -> None:
-    found = [try_clause(engine(name), clause) for clause in TREES.clauses]
-    if "missing" in {each.status for each in found}:
-        pytest.skip(found[0].message)
-    assert {each.clause: each.message for each in found if each.status == "broken"} == {}
-
-
-@pytest.mark.slow
 def test_a_flexible_tree_that_does_not_swing_as_it_should_is_noticed() -> None:
     clause = CLAUSES[NEEDS_A_RUN]
     assert try_clause(engine("native"), clause).status == "holds"

@@ -12,7 +12,7 @@ pytest.importorskip("exudyn", reason="Exudyn is not installed: pip install flexm
 from crosscheck.engines.contract import Effort, EngineMissing, Run
 from crosscheck.engines.exudyn import ExudynBeamEngine, ExudynEngine, library
 from flexmb.scene import schema as s
-from flexmb.scene.functions import Ramp, Sine
+from flexmb.scene.functions import Ramp
 
 G = 9.81
 TENSOR = ((0.3, 0.02, 0.01), (0.02, 0.5, 0.03), (0.01, 0.03, 0.6))
@@ -83,38 +83,6 @@ def test_energy_momentum_and_order_across_every_hinge(kind):
     assert drift[2] < max(drift[0] / 10.0, 1e-7 * scale) and drift[2] < 1e-5 * scale
     momentum = runs[2].momentum
     assert np.ptp(momentum, axis=0).max() < 1e-5 * np.abs(momentum).max()
-
-
-@pytest.mark.parametrize("kind", ["revolute", "universal", "planar"])
-def test_loads_converge_to_those_of_the_equations_of_motion(kind):
-    """At the first sample the run's loads are the pointwise ones, later they follow the refined run."""
-    model = ExudynEngine().compile(tree(kind))
-    run = model.simulate(Run(np.linspace(0.0, 0.16, 17)), Effort("step", 0.0025, "TrapezoidalIndex2"))
-    snapshot = model.evaluate()
-    scale = np.abs(run.loads["joint"]).max()
-    assert np.abs(run.loads["joint"][0] - snapshot.loads["joint"]).max() < 1e-9 * scale
-    # continuity: extrapolating the next three samples back to t = 0 (cubic) meets the pointwise load
-    back = 3.0 * run.loads["joint"][1] - 3.0 * run.loads["joint"][2] + run.loads["joint"][3]
-    assert np.abs(back - snapshot.loads["joint"]).max() < 2e-2 * scale
-
-
-def test_prescribed_hinge_needs_the_torque_of_its_inertia():
-    """J th'' about the axis at every sample, with th = sin(3 t) and no gravity; second order in the step."""
-    driven = s.AngularCoordinate(prescribed_rad=Sine(amplitude=1.0, angular_frequency_rad_s=3.0))
-    scene = s.Scene(
-        name="driven", bodies=(rigid("arm"),), markers=(),
-        hinges=(s.Revolute(name="drive", parent="ground", child="arm", rotation=driven),),
-    )  # fmt: skip
-    model = ExudynEngine().compile(scene)
-    J = 0.6 + 2.0 * (0.3**2 + 0.1**2)
-    times = np.linspace(0.0, 2.0, 201)
-    errors = []
-    for h in (0.005, 0.0025):
-        run = model.simulate(Run(times), Effort("step", h, "TrapezoidalIndex2"))
-        errors.append(np.abs(run.drives["drive"][:, 0] + J * 9.0 * np.sin(3.0 * times)).max())
-        assert run.drives["drive"][:, 0] == pytest.approx(run.loads["drive"][:, 2], abs=1e-9)
-    # the Newton tolerance (1e-8 of the residual) blurs the ratio of 4 a little
-    assert errors[1] < 1e-4 * J * 9.0 and errors[0] / errors[1] == pytest.approx(4.0, rel=0.25)
 
 
 def test_prescribed_wheel_passes_many_turns():
