@@ -120,13 +120,8 @@ def _section(case: Case) -> Iterator[str]:
     yield f"Cite: {cite(case)}\n"
 
 
-def main() -> None:
-    """Write the pages."""
+if __name__ == "__main__":
     PAGE.write_text(page(), encoding="utf-8")
     FOLDER.mkdir(exist_ok=True)
     for path, text in pages().items():
         path.write_text(text, encoding="utf-8")
-
-
-if __name__ == "__main__":
-    main()

@@ -11,11 +11,10 @@ from crosscheck.label.evidence import evidence, of_case, of_measured_set
 from crosscheck.label.factors import CRITERIA, FACTORS, TITLES
 from crosscheck.library.find import shipped_cases
 from crosscheck.validation.measured_set import find_set, shipped_sets
-from tests.repo.project import ROOT
+from tests.repo.project import ROOT, spliced
 
 PAGE = ROOT / "docs" / "credibility.md"
 MARK = "<!-- {}: written by python -m tests.repo.credibility -->\n"
-END = "<!-- end -->"
 FEW = 12
 NOWHERE = Path("no session")  # nothing lies there: the case's own folder is all
 
@@ -55,8 +54,7 @@ def page() -> str:
     """The text of the page, with its tables anew."""
     text = PAGE.read_text(encoding="utf-8")
     for name, table in (("criteria", criteria()), ("levels", levels())):
-        before, mark, rest = text.partition(MARK.format(name))
-        text = before + mark + table + END + rest.partition(END)[2]
+        text = spliced(text, MARK.format(name), table)
     return text
 
 

@@ -16,10 +16,5 @@ def schema() -> str:
     return json.dumps(found | msgspec.json.schema(ExpectFile), indent=1) + "\n"
 
 
-def main() -> None:
-    """Write the file."""
-    FILE.write_text(schema(), encoding="utf-8")
-
-
 if __name__ == "__main__":
-    main()
+    FILE.write_text(schema(), encoding="utf-8")

@@ -15,10 +15,10 @@ from flexmb.export.model import memory
 from flexmb.export.refusals import NotExportable, refuse
 from flexmb.scene.problems import SceneWarning
 from flexmb.system.compile import compile
-from tests.repo.project import ROOT
+from tests.repo.project import ROOT, spliced
 
 PAGE = ROOT / "docs" / "export-fmu.md"
-START, END = "<!-- exported: written by python -m tests.repo.exported -->\n", "<!-- end -->"
+START = "<!-- exported: written by python -m tests.repo.exported -->\n"
 
 
 def row(case: Case) -> str:
@@ -48,8 +48,7 @@ def table() -> Iterator[str]:
 
 def page(lines: str) -> str:
     """The page with these lines for its table."""
-    before, _, rest = PAGE.read_text(encoding="utf-8").partition(START)
-    return before + START + lines + END + rest.partition(END)[2]
+    return spliced(PAGE.read_text(encoding="utf-8"), START, lines)
 
 
 if __name__ == "__main__":

@@ -20,12 +20,12 @@ from crosscheck.records.archive import read
 from crosscheck.records.session import standing
 from crosscheck.report.html import places
 from crosscheck.report.speed import LEVELS, ChartOfCase, fastest, speed_view
-from tests.repo.project import ROOT
+from tests.repo.project import ROOT, spliced
 
 KEPT = ROOT / "docs" / "pictures" / "speed.json"
 PICTURE = ROOT / "docs" / "pictures" / "speed.svg"
 PLACES = {"docs/tour.md": "pictures/speed.svg"}  # where it is shown
-BEGIN, END = "<!-- written by tests.repo.front -->\n", "<!-- end -->\n"  # of the table on these pages
+START = "<!-- written by tests.repo.front -->\n"  # of the table on these pages
 EXPONENTS = range(-1, -13, -1)
 COLOURS = {
     "native": "#0072b2", "pinocchio": "#d55e00", "mujoco": "#009e73", "exudyn": "#b07a00", "exudyn-beam": "#b8609a",
@@ -144,9 +144,7 @@ def table(front: Front) -> str:
 
 def with_table(page: str, front: Front) -> str:
     """A page with the table between its marks."""
-    before, _, rest = page.partition(BEGIN)
-    _, _, after = rest.partition(END)
-    return f"{before}{BEGIN}\n{table(front)}\n{END}{after}"
+    return spliced(page, START, f"\n{table(front)}\n")
 
 
 def _curve_lines(curve: Curve, at: Callable[[float, float], tuple[float, float]], top: float) -> list[str]:

@@ -75,10 +75,5 @@ def _map(what: StabilityMap, verdict: MapVerdict) -> str:
     )
 
 
-def main() -> None:
-    """Write the page."""
-    PAGE.write_text(page(), encoding="utf-8")
-
-
 if __name__ == "__main__":
-    main()
+    PAGE.write_text(page(), encoding="utf-8")

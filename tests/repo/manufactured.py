@@ -12,10 +12,10 @@ from crosscheck.manufacture.doubt import answers
 from crosscheck.manufacture.drives import manufacture, orders
 from flexmb.run.channels import signal_range
 from tests.crosscheck.manufacture import scenes
-from tests.repo.project import ROOT
+from tests.repo.project import ROOT, spliced
 
 PAGE = ROOT / "docs" / "manufactured.md"
-START, END = "<!-- manufactured: written by python -m tests.repo.manufactured -->\n", "<!-- end -->"
+START = "<!-- manufactured: written by python -m tests.repo.manufactured -->\n"
 SCENES = {"three rigid bodies": (scenes.rigid(0), 5), "a beam and a rigid body": (scenes.scene(9), 9)}
 """Scenes and seeds of their motions."""
 
@@ -56,6 +56,5 @@ def orders_table() -> Iterator[str]:
 
 
 if __name__ == "__main__":
-    before, _, rest = PAGE.read_text(encoding="utf-8").partition(START)
     lines = "".join(f"{line}\n" for line in (*engines_table(), "", *orders_table()))
-    PAGE.write_text(before + START + lines + END + rest.partition(END)[2], encoding="utf-8")
+    PAGE.write_text(spliced(PAGE.read_text(encoding="utf-8"), START, lines), encoding="utf-8")

@@ -19,6 +19,15 @@ def text_files() -> Iterator[Path]:
                 yield path
 
 
+def spliced(page: str, start: str, table: str, end: str = "<!-- end -->") -> str:
+    """A page with another table between these marks."""
+    before, mark, rest = page.partition(start)
+    _, closed, after = rest.partition(end)
+    if not mark or not closed:
+        raise ValueError(f"the page has no place for the table, between {start!r} and {end!r}")
+    return before + mark + table + closed + after
+
+
 def is_cache(path: Path) -> bool:
     """Whether a relative path lies in a folder that tools leave behind, or in that of the compiled kernels."""
     return any(part in ("__pycache__", "kernels") or part.startswith(".") for part in path.parts)

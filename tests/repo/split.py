@@ -7,10 +7,10 @@ import sys
 from datetime import date
 from pathlib import Path
 
-from tests.repo.project import ROOT
+from tests.repo.project import ROOT, spliced
 
 PAGE = ROOT / "CONTRIBUTING.md"
-BEGIN, END = "<!-- written by .ci/run --write -->\n", "<!-- end -->\n"
+START = "<!-- written by .ci/run --write -->\n"
 
 
 def table(lines: list[str], kernels: str, cores: str) -> str:
@@ -22,18 +22,9 @@ def table(lines: list[str], kernels: str, cores: str) -> str:
     return "\n".join([head, "", "| step | s |", "|---|---|", *rows, ""])
 
 
-def written(page: str, made: str) -> str:
-    """The page with another table."""
-    before, _, rest = page.partition(BEGIN)
-    _, _, after = rest.partition(END)
-    if not rest or not after:
-        raise ValueError(f"CONTRIBUTING.md has no place for the table, between {BEGIN!r} and {END!r}")
-    return before + BEGIN + made + END + after
-
-
 if __name__ == "__main__":
     file, kernels, cores, *options = sys.argv[1:]
     made = table(Path(file).read_text(encoding="utf-8").splitlines(), kernels, cores)
     print(made)
     if "--write" in options:
-        PAGE.write_text(written(PAGE.read_text(encoding="utf-8"), made), encoding="utf-8")
+        PAGE.write_text(spliced(PAGE.read_text(encoding="utf-8"), START, made), encoding="utf-8")

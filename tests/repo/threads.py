@@ -67,10 +67,5 @@ def _listed(names: Iterable[str], kind: str = "") -> str:
     return ", ".join(f"`{name}`{marks[name]}" for name in sorted(marks))
 
 
-def main() -> None:
-    """Write the page."""
-    PAGE.write_text(page(), encoding="utf-8")
-
-
 if __name__ == "__main__":
-    main()
+    PAGE.write_text(page(), encoding="utf-8")

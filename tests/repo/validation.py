@@ -7,10 +7,10 @@ from collections.abc import Iterator
 
 from crosscheck.validation.budget import budget
 from crosscheck.validation.measured_set import find_set, shipped_sets
-from tests.repo.project import ROOT
+from tests.repo.project import ROOT, spliced
 
 PAGE = ROOT / "docs" / "validation.md"
-START, END = "<!-- measured: written by python -m tests.repo.validation -->\n", "<!-- end -->"
+START = "<!-- measured: written by python -m tests.repo.validation -->\n"
 
 
 def table() -> Iterator[str]:
@@ -31,6 +31,5 @@ def table() -> Iterator[str]:
 
 
 if __name__ == "__main__":
-    before, _, rest = PAGE.read_text(encoding="utf-8").partition(START)
     lines = "".join(f"{line}\n" for line in table())
-    PAGE.write_text(before + START + lines + END + rest.partition(END)[2], encoding="utf-8")
+    PAGE.write_text(spliced(PAGE.read_text(encoding="utf-8"), START, lines), encoding="utf-8")
