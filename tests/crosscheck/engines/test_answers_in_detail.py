@@ -182,6 +182,7 @@ BREACHES: list[tuple[dict[str, Any], str]] = [
     ({"momentum": numbers(3)}, "momentum has shape (11, 3); (11, 6) was expected"),
     ({"momentum": spoilt(numbers(6))}, f"momentum {FINITE}"),
     ({"work": "much"}, "work is a str, not an array"),
+    ({"momentum": numbers(6, 1)}, "momentum has shape (11, 6, 1); (11, 6) was expected"),
     ({"work": numbers(1)}, "work has shape (11, 1); (11,) was expected"),
     ({"work": spoilt(numbers(), 10)}, "work is not finite at t = 1 s, and the status is finished"),
     ({"undetermined": ["load:pivot.force"]}, "undetermined returned a list, not a tuple"),
@@ -213,6 +214,14 @@ def test_numbers_that_nothing_determines_need_not_be_finite() -> None:
     assert checked_run(replace(GOOD, **half, undetermined=("load:pivot.torque",)), TIMES, SCENE).status == "finished"
     with pytest.raises(BrokenContract, match=r"loads\['pivot'\] is not finite"):
         checked_run(replace(GOOD, **half, undetermined=("load:pivot.force",)), TIMES, SCENE)
+
+
+def test_loads_of_a_tree_are_determined() -> None:
+    """A claim that they are not would take those of all other engines out of the comparison."""
+    tree, run = cast(Scene, SimpleNamespace(**OWN, constraints=())), replace(GOOD, loads={"pivot": numbers(6)})
+    assert checked_run(run, TIMES, tree).status == "finished"
+    with pytest.raises(BrokenContract, match="load:pivot.torque.*the scene has no closures or couplings"):
+        checked_run(replace(run, undetermined=("load:pivot.torque",)), TIMES, tree)
 
 
 @pytest.mark.parametrize("column", range(6))
