@@ -9,7 +9,7 @@ from flexmb.jain.derivatives import affine
 from flexmb.jain.derivatives.hinges import force_to_world
 from flexmb.jain.derivatives.modes import in_body_axes
 from flexmb.jain.derivatives.ports import seed_mode
-from flexmb.jain.derivatives.strained import strained_force
+from flexmb.jain.derivatives.strained import strained_force, sum_strains
 from flexmb.jain.derivatives.strips_of import put_strips, strips_of
 from flexmb.jain.derivatives.tables import MODE_BY_RATE, MODE_BY_TURN, MODE_FORCE, MODE_ROW, MODE_ROWS
 from flexmb.jit.duals import RATES, rate, seeded
@@ -127,6 +127,7 @@ def _exact_by_rates(c, w, d, k, V, A):
         moves = moves or w.etad[k, n] != 0.0
     if moves:
         _enter(c, w, d.duals, k, V)
+        sum_strains(c, d.duals, k)
         _along(c, w, d, k, A, 0, 3)
         _along(c, w, d, k, A, 3 + nm, 3 + 2 * nm)
         return
@@ -155,6 +156,7 @@ def _exact_by_displacements(c, w, d, k):
     R, origin, A = mat3(d.body[k].rotation, 0), vec3(d.body[k].origin, 0), _acceleration(d, k)
     e, nm, first, whole = d.duals, c.body[k].modes, d.places[k].modes, vec6(d.body[k].force, 0)
     _enter(c, w, e, k, vec6(w.body[k].velocity, 0))
+    sum_strains(c, e, k)
     for j in range(c.body[k].section_start, c.body[k].section_stop):
         store6(e.at_section[j].held, 0, ZERO6)
     for i in range(c.body[k].port_start, c.body[k].port_stop):

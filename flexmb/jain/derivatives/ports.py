@@ -12,7 +12,7 @@ only their accelerations act.
 """
 
 from flexmb.jain.derivatives.hinges import to_world
-from flexmb.jain.derivatives.strained import place_section, turn_sections
+from flexmb.jain.derivatives.strained import place_section, sum_strains, turn_sections
 from flexmb.jain.derivatives.strips_of import put3_until, put_strips, put_strips_until, strips_of
 from flexmb.jain.derivatives.tables import (
     BY_ACCELERATION,
@@ -203,6 +203,7 @@ def _change_at_section(c, w, d, k, i):
         moves = moves or w.etad[k, n] != 0.0
         for row in range(6):
             d.change[12 + row, n] = 0.0  # A_r is quadratic in the speeds
+    sum_strains(c, e, k)
     for first in range(0, 2 * nm if moves else nm, nm):
         for start in range(0, nm, RATES):
             count = min(RATES, nm - start)

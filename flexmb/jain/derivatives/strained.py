@@ -7,9 +7,10 @@ inward, forces at sections become forces F on the tangents at the Gauss points, 
 t x F on the sections, which each passes to the one before it. No velocity of a single mode is needed. Points at the
 root sit on no section: they move with the body frame, and no mode moves them.
 
-Only a few modes have derivatives at a time, the `seeds` (first, stop): sums over all others are of floats. What acts at
-ports of the body, of known constant forces in body axes, may be `held` at their sections: the rows change with the
-motion that the modes give these places, too.
+Only a few modes have derivatives at a time, the `seeds` (first, stop). Sums over all modes are the same along all
+directions: `sum_strains` has found them before, and what the seeds change is added to them. What acts at ports of the
+body, of known constant forces in body axes, may be `held` at their sections: the rows change with the motion that the
+modes give these places, too.
 
 Modal masses beside the points, from a matrix that was added, are constant, as is their share of the rows, which is left
 out. Only the derivatives of the rows are right.
@@ -90,36 +91,49 @@ def turn_sections(c, e, k, seeds):
             _turn(c, e, k, j, seeds)
 
 
+@sweep
+def sum_strains(c, e, k):
+    """The rows of all sections of body k times its modal displacements, speeds and accelerations, without their
+    derivatives."""
+    for j in range(c.body[k].section_start, c.body[k].section_stop):
+        rows, own = c.section_rows[j], e.at_section[j]
+        for row in range(12):
+            found, rate, faster = 0.0, 0.0, 0.0
+            for n in range(c.body[k].modes):
+                found += rows[row, n] * e.eta[k, n].real
+                rate += rows[row, n] * e.etad[k, n].real
+                faster += rows[row, n] * e.etadd[k, n].real
+            own.displaced[row], own.rates[row], own.accelerations[row] = found, rate, faster
+
+
 @helper
-def _sum(c, k, j, row, x, seeds):
-    """Three rows of section j times one number x (m,) of each mode."""
-    found, change = ZERO3, ZERO3
-    for n in range(c.body[k].modes):
-        found = axpy(x[n].real, column3(c.section_rows[j], row, n), found)
+def _sum(c, j, row, known, x, seeds):
+    """Three rows of section j times one number x (m,) of each mode; `known` (12,): those of `sum_strains`."""
+    found = vec3(known, row)
     for n in range(seeds[0], seeds[1]):
-        change = axpy(x[n] - x[n].real, column3(c.section_rows[j], row, n), change)
-    return add(found, change)
+        found = axpy(x[n] - x[n].real, column3(c.section_rows[j], row, n), found)
+    return found
 
 
 @sweep
-def _integrals(c, k, j, x, seeds):
+def _integrals(c, j, known, x, seeds):
     """Those of the three integrals of the curvature."""
-    whole, linear = _sum(c, k, j, WHOLE, x, seeds), _sum(c, k, j, LINEAR, x, seeds)
-    return whole, linear, _sum(c, k, j, SQUARE, x, seeds)
+    whole, linear = _sum(c, j, WHOLE, known, x, seeds), _sum(c, j, LINEAR, known, x, seeds)
+    return whole, linear, _sum(c, j, SQUARE, known, x, seeds)
 
 
 @sweep
 def _turn(c, e, k, j, seeds):
     """R, w and alpha of section j from those of the section before."""
     i, own = c.section[j].before, e.at_section[j]
-    whole, linear, square = _integrals(c, k, j, e.eta[k], seeds)
+    whole, linear, square = _integrals(c, j, own.displaced, e.eta[k], seeds)
     store3(own.whole, 0, whole)
     store3(own.linear, 0, linear)
     store3(own.square, 0, square)
     turn, at = magnus(whole, linear, square)
-    whole, linear, square = _integrals(c, k, j, e.etad[k], seeds)
+    whole, linear, square = _integrals(c, j, own.rates, e.etad[k], seeds)
     rate, bent = magnus_change(at, whole, linear, square), magnus_bend(at, whole, linear, square)
-    whole, linear, square = _integrals(c, k, j, e.etadd[k], seeds)
+    whole, linear, square = _integrals(c, j, own.accelerations, e.etadd[k], seeds)
     bent = add(bent, magnus_change(at, whole, linear, square))
     p = exponential_coefficients(dot(turn, turn))
     R, omega, alpha = IDENTITY, ZERO3, ZERO3
@@ -134,13 +148,13 @@ def _turn(c, e, k, j, seeds):
 @sweep
 def _turn_about_axis(c, e, k, j, seeds):
     """The same where all sections turn about one axis."""
-    axis = vec3(c.body[k].bending_axis, 0)
-    angle, rate, bent = 0.0, 0.0, 0.0
-    for n in range(c.body[k].modes):
+    axis, own = vec3(c.body[k].bending_axis, 0), e.at_section[j]
+    angle, rate, bent = own.displaced[ANGLE], own.rates[ANGLE], own.accelerations[ANGLE]
+    for n in range(seeds[0], seeds[1]):
         slope = c.section_rows[j, ANGLE, n]
-        angle = e.eta[k, n] * slope + angle
-        rate = e.etad[k, n] * slope + rate
-        bent = e.etadd[k, n] * slope + bent
+        angle += (e.eta[k, n] - e.eta[k, n].real) * slope
+        rate += (e.etad[k, n] - e.etad[k, n].real) * slope
+        bent += (e.etadd[k, n] - e.etadd[k, n].real) * slope
     sine, cosine = sincos(angle)
     _bend(c, e, k, j, in_powers(axis, sine, 1.0 - cosine), scale(rate, axis), scale(bent, axis), seeds)
 
@@ -151,19 +165,19 @@ def _bend(c, e, k, j, R, omega, alpha, seeds):
     store9(e.section[j].R, 0, R)
     store3(e.section[j].omega, 0, omega)
     store3(e.section[j].alpha, 0, alpha)
-    g = c.section[j].gauss
+    g, own = c.section[j].gauss, e.at_section[j]
     if g < 0:
         return
     at_rest = vec3(c.section[j].tangent, 0)
     stretched, rate, faster = at_rest, ZERO3, ZERO3
     if c.body[k].stretching:
-        stretched = add(at_rest, _sum(c, k, j, STRETCH, e.eta[k], seeds))
-        rate = times(R, _sum(c, k, j, STRETCH, e.etad[k], seeds))
-        faster = times(R, _sum(c, k, j, STRETCH, e.etadd[k], seeds))
+        stretched = add(at_rest, _sum(c, j, STRETCH, own.displaced, e.eta[k], seeds))
+        rate = times(R, _sum(c, j, STRETCH, own.rates, e.etad[k], seeds))
+        faster = times(R, _sum(c, j, STRETCH, own.accelerations, e.etadd[k], seeds))
     tangent = times(R, stretched)
     store3(e.tangent[g].change, 0, sub(tangent, at_rest))
     turning = cross(omega, tangent)
-    store3(e.at_section[j].rate, 0, add(turning, rate))
+    store3(own.rate, 0, add(turning, rate))
     turning = cross(omega, add(turning, scale(2.0, rate)))
     store3(e.tangent[g].acceleration, 0, add(add(cross(alpha, tangent), turning), faster))
 

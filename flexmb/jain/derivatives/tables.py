@@ -118,6 +118,10 @@ END_MOTION, END_DISPLACED, END_MOVED, END_SPEED, END_ROWS = 0, 6, 12, 18, 24
 
 AT_SECTION = np.dtype(  # of a beam of level exact
     [
+        # `section_rows` times modal displacements, speeds and accelerations, without derivatives
+        ("displaced", _F, (12,)),
+        ("rates", _F, (12,)),
+        ("accelerations", _F, (12,)),
         ("whole", _F, (3,)),  # the three integrals of its curvature since the section before
         ("linear", _F, (3,)),
         ("square", _F, (3,)),

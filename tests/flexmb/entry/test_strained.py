@@ -11,7 +11,7 @@ import pytest
 
 import flexmb as fm
 from flexmb.jain.derivatives import flexible
-from flexmb.jain.derivatives.strained import strained_force
+from flexmb.jain.derivatives.strained import strained_force, sum_strains
 from flexmb.jain.derivatives.tables import duals
 from flexmb.jit.counting import _counting
 from flexmb.jit.duals import RATES
@@ -85,7 +85,8 @@ def applied(name: str, term: Term | None = None) -> Body:
     """A beam with the force by applied masses, without a term of it."""
     body = moving(BEAMS[name])
     with np.errstate(all="ignore"):
-        interpreted._Without(term)(strained_force)(body.c, body.e, 0, body.A, (0, body.modes))
+        for part, more in ((sum_strains, ()), (strained_force, (body.A, (0, body.modes)))):
+            interpreted._Without(term)(part)(body.c, body.e, 0, *more)
     return body
 
 
@@ -117,7 +118,8 @@ def test_twice_the_pieces_cost_a_direction_little_more_than_twice(monkeypatch: p
         with monkeypatch.context() as patch:
             times = interpreted.Dual.__mul__
             patch.setattr(interpreted.Dual, "__mul__", lambda a, b, met=met, times=times: met.append(1) or times(a, b))
-            interpreted._Without(None)(strained_force)(body.c, body.e, 0, body.A, (0, body.modes))
+            for part, more in ((sum_strains, ()), (strained_force, (body.A, (0, body.modes)))):
+                interpreted._Without(None)(part)(body.c, body.e, 0, *more)
         products.append(len(met))
     assert products[1] < 2.6 * products[0]
 
