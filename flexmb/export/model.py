@@ -149,23 +149,15 @@ def _code(identifier: str, kinds: tuple[Any, Any, Any]) -> bytes:
     })  # fmt: skip
 
 
-class _Named(NamedTuple):
-    """What `labels` needs of a run."""
-
-    q_names: tuple[tuple[str, str], ...]
-    u_names: tuple[tuple[str, str], ...]
-
-
 def _outputs(system: System, block: Image) -> Iterator[Output]:
     """Everything observable, in the order of a trajectory's columns; rotations are matrices."""
     names, out = system.observed_names, system.observation.out
-    run = _Named(*system.state_names)
 
     def place(array: Real) -> int:
         return block.word(OUT, "every") + (array.ctypes.data - out.every.ctypes.data) // ROW
 
     def columns(kind: Kind, name: str, first: int, width: int) -> Iterator[Output]:
-        for i, (label, unit) in enumerate(labels(run, kind, name, width)):
+        for i, (label, unit) in enumerate(labels(kind, name, width)):
             yield Output(label, unit, first + i)
 
     for i, name in enumerate(names.markers):
@@ -184,7 +176,7 @@ def _outputs(system: System, block: Image) -> Iterator[Output]:
             yield from columns(kind, name, place(rows[i]), 6)
     for name, places in names.driven.items():
         for i, speed in enumerate(places.tolist()):
-            unit = {"rad/s": "N m", "m/s": "N"}[run.u_names[speed][1]]
+            unit = {"rad/s": "N m", "m/s": "N"}[system.state_names[1][speed][1]]
             yield Output(f"{name}.drive[{i}]", unit, block.word(OUT, "drives") + speed)
     along = {each.name: each for each in system.scene.connectors if isinstance(each, AlongHinge)}
     for i, name in enumerate(names.hinge_forces):
