@@ -1,14 +1,16 @@
 """Compile general kernels: `python -m flexmb.ready.make FOLDER [--first] [--processor x86-64-v3]`.
 
 Several processes divide the uses of `flexmb.ready.uses` among themselves. Kernels that are already in the folder are
-not compiled again; kernels that no use needs any more are deleted. The build hook runs this at installation. It says
-what it does: a line after every use, and where there is none for some seconds, how far it is.
+not compiled again; kernels that no use needs any more are deleted. Where no source and no kernel has changed since they
+were made, nothing is done. The build hook runs this at installation. It says what it does: a line after every use, and
+where there is none for some seconds, how far it is.
 """
 
 from __future__ import annotations
 
 import argparse
 import gc
+import hashlib
 import json
 import logging
 import multiprocessing
@@ -54,7 +56,13 @@ def make(folder: Path, processes: int, processor: str = "", first: bool = False)
     """
     folder.mkdir(parents=True, exist_ok=True)
     with compiled_once(folder / MADE_BY):  # of two simultaneous installations, the second waits and finds the kernels
-        return _made(folder, processes, processor, first and not described(folder).get("whole"))
+        first = first and not described(folder).get("whole")
+        by = {"whole": not first, "sources": _digest(Path(__file__).parents[1], "*.py")} | _maker(processor)
+        if by | {"kernels": _digest(folder, KERNELS)} == _without_seconds(described(folder)):
+            _say("no source and no kernel has changed since they were made")
+        else:
+            _made(folder, processes, processor, by)
+        return sorted(folder.glob(KERNELS))
 
 
 def make_the_rest(processes: int) -> Path:
@@ -66,15 +74,36 @@ def make_the_rest(processes: int) -> Path:
     if folder is None:
         raise OSError("no folder is writable to keep kernels: set NUMBA_CACHE_DIR to one that is")
     with _environment({}):
-        _refuse_failures(_run(_names(first=False), processes, folder)[0])
+        _refuse_failures(_run(_names(first=False), processes, folder))
     return folder
 
 
-def _made(folder: Path, processes: int, processor: str, first: bool) -> list[Path]:
+def _digest(folder: Path, pattern: str) -> str:
+    """Of names and contents of all files of this pattern below a folder."""
+    digest = hashlib.sha256()
+    for file in sorted(folder.rglob(pattern)):
+        contents = file.read_bytes()
+        digest.update(f"{file.relative_to(folder).as_posix()} {len(contents)}\n".encode() + contents)
+    return digest.hexdigest()
+
+
+def _maker(processor: str) -> dict[str, object]:
+    """What a process compiles for that begins in the environment of the workers, as it is read from a file."""
+    with _environment(_target(processor)), ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+        read: dict[str, object] = json.loads(json.dumps(pool.submit(description).result()))
+    return read
+
+
+def _without_seconds(made: dict[str, object]) -> dict[str, object]:
+    return {name: value for name, value in made.items() if name != "seconds"}
+
+
+def _made(folder: Path, processes: int, processor: str, by: dict[str, object]) -> None:
+    """Compile what the folder lacks; `by` is what MADE_BY says of it, beside the kernels and their seconds."""
     for file in folder.glob(KERNELS):
         os.utime(file, (UNUSED, UNUSED))
     with tempfile.TemporaryDirectory() as made, _environment({"NUMBA_CACHE_DIR": made} | _target(processor)):
-        used, now = _run(_names(first), processes, Path(made))
+        used = _run(_names(first=not by["whole"]), processes, Path(made))
         for file in Path(made).rglob(KERNELS):
             with whole_file(folder / file.name) as place:
                 shutil.copyfile(file, place)
@@ -84,15 +113,15 @@ def _made(folder: Path, processes: int, processor: str, first: bool) -> list[Pat
             spent[name] = spent.get(name, 0.0) + seconds
     before = described(folder).get("seconds", {})
     seconds = before | {name: round(found, 1) for name, found in spent.items() if found >= WORTH_NOTING}
-    with whole_file(folder / MADE_BY) as place:
-        text = json.dumps(now | {"whole": not first, "seconds": dict(sorted(seconds.items()))}, indent=1)
-        place.write_text(text + "\n", encoding="utf-8")
     for file in folder.glob(KERNELS):
         if file.stat().st_mtime == UNUSED:
             file.unlink()
+    failed = any(use.trouble for use in used)  # then the next installation tries again
+    by = by | {"kernels": "" if failed else _digest(folder, KERNELS), "seconds": dict(sorted(seconds.items()))}
+    with whole_file(folder / MADE_BY) as place:
+        place.write_text(json.dumps(by, indent=1) + "\n", encoding="utf-8")
     _refuse_failures(used)
     print(f"{sum(spent.values()):.0f} s of processor time were spent on kernels", file=sys.stderr)
-    return sorted(folder.glob(KERNELS))
 
 
 def _refuse_failures(used: Iterable[Used]) -> None:
@@ -101,10 +130,10 @@ def _refuse_failures(used: Iterable[Used]) -> None:
         raise RuntimeError(f"uses that failed, whose kernels may be missing: {'; '.join(failed)}")
 
 
-def _run(names: Sequence[str], processes: int, made: Path) -> tuple[list[Used], dict[str, object]]:
-    """What the uses of these names have taken, and what their processes compile for; kernels come into `made`."""
+def _run(names: Sequence[str], processes: int, made: Path) -> list[Used]:
+    """What the uses of these names have taken; kernels come into `made`."""
     start, used, before = perf_counter(), list[Used](), _kernels(made)
-    with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool:
+    with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"), _without_events) as pool:
         left = {pool.submit(_use, name): name for name in names}
         while left:
             done = wait(left, SILENCE, FIRST_COMPLETED).done
@@ -115,8 +144,7 @@ def _run(names: Sequence[str], processes: int, made: Path) -> tuple[list[Used], 
             if not done:
                 kernels, spent = _kernels(made) - before, perf_counter() - start
                 _say(f"{len(used):3d} of {len(names)}  compiling, {kernels} kernels after {spent:.0f} s")
-    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
-        return used, pool.submit(description).result()
+    return used
 
 
 def _result(done: Future[Used], name: str) -> Used:
@@ -156,6 +184,18 @@ def _names(first: bool) -> list[str]:
     from flexmb.ready.uses import FIRST, uses  # it imports numba, which must happen in the environment of the workers
 
     return list(FIRST) if first else [name for name, _ in uses()]
+
+
+def _without_events() -> None:
+    """In a process that only compiles, nobody asks numba how long it held its locks: at each call of LLVM it notes that
+    once for every function whose compilation is not finished, which takes a fiftieth of compiling."""
+    from numba.core import event
+
+    event.start_event = event.end_event = _unheard
+
+
+def _unheard(*_: object, **__: object) -> None:
+    """In place of telling all who listen to an event."""
 
 
 def _use(name: str) -> Used:

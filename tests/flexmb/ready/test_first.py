@@ -15,6 +15,8 @@ from time import sleep
 from types import SimpleNamespace
 
 import pytest
+from numba import njit
+from numba.core import event
 
 import flexmb
 from flexmb.jit import installed
@@ -93,15 +95,74 @@ def test_silence_is_broken_by_how_far_it_is(tmp_path: Path, monkeypatch, capsys)
 
     monkeypatch.setattr(make, "_use", use)
     monkeypatch.setattr(make, "SILENCE", 0.15)
-    monkeypatch.setattr(make, "ProcessPoolExecutor", lambda processes, context: ThreadPoolExecutor(1))
+    monkeypatch.setattr(make, "ProcessPoolExecutor", lambda processes, context, begin: ThreadPoolExecutor(1))
     (tmp_path / "old-00.kernel").touch()
-    used, _ = make._run(["one", "two", "three"], 1, tmp_path)
+    used = make._run(["one", "two", "three"], 1, tmp_path)
     lines = capsys.readouterr().err.splitlines()
     told = [line for line in lines if "compiling" not in line]
     assert [line[:8] for line in told] == ["  1 of 3", "  2 of 3", "why", "  3 of 3", "a proces"]
     assert "  0 of 3  compiling, 1 kernels after 0 s" in lines
     with pytest.raises(RuntimeError, match="whose kernels may be missing: two; three$"):
         make._refuse_failures(used)
+
+
+def test_what_has_not_changed_is_not_made_again(tmp_path: Path, monkeypatch, capsys) -> None:
+    """As where a wheel is built of a checkout that is installed. What could make another kernel is a change."""
+    package, folder, compiled = tmp_path / "flexmb", tmp_path / "kernels", list[list[str]]()
+    (package / "ready").mkdir(parents=True)
+    (package / "code.py").write_text("one")
+
+    def run(names: list[str], processes: int, made: Path) -> list[make.Used]:
+        compiled.append(names)
+        (made / "a-00.kernel").write_text("machine code")
+        return [make.Used("one", 1.0, trouble, {"a": 2.0})]
+
+    def changes(first: bool = False) -> bool:
+        count = len(compiled)
+        found = make.make(folder, 1, first=first)
+        assert [file.name for file in found] == ["a-00.kernel"]
+        assert ("has changed since" in capsys.readouterr().err) == (len(compiled) == count)
+        return len(compiled) > count
+
+    maker, trouble = {"versions": {"numba": "1"}, "processor": ["x"]}, ""
+    monkeypatch.setattr(make, "__file__", str(package / "ready" / "make.py"))
+    monkeypatch.setattr(make, "_run", run)
+    monkeypatch.setattr(make, "_maker", lambda processor: maker)
+    monkeypatch.setattr(make, "_names", lambda first: ["first"] if first else ["first", "other"])
+    assert changes(first=True) and not changes(first=True)
+    assert changes() and not changes() and not changes(first=True)  # a folder that once had all
+    assert compiled == [["first"], ["first", "other"]]
+    (package / "code.py").write_text("two")
+    assert changes() and not changes()
+    (package / "more.py").touch()
+    assert changes() and not changes()
+    (folder / "a-00.kernel").write_text("damaged code")
+    assert changes() and not changes()
+    (folder / "b-00.kernel").touch()
+    assert changes() and not changes()
+    maker = {"versions": {"numba": "2"}, "processor": ["x"]}
+    assert changes() and not changes()
+    (package / "code.py").write_text("three")
+    trouble = "why"
+    with pytest.raises(RuntimeError, match="missing: one"):
+        changes()
+    trouble = ""
+    assert changes() and not changes()
+
+
+def test_a_process_that_only_compiles_tells_nobody_of_locks(monkeypatch) -> None:
+    """Negative control: otherwise who listens is told."""
+
+    def told() -> bool:
+        with event.install_recorder("numba:compiler_lock") as recorder:
+            njit(lambda x: x + 1)(1)
+        return bool(recorder.buffer)
+
+    monkeypatch.setattr(event, "start_event", event.start_event)
+    monkeypatch.setattr(event, "end_event", event.end_event)
+    assert told()
+    make._without_events()
+    assert not told()
 
 
 @whole
@@ -111,7 +172,7 @@ def test_readme_and_canonical_need_nothing_beyond(tmp_path: Path) -> None:
     package, out = tmp_path / "flexmb", tmp_path / "out"
     shutil.copytree(Path(flexmb.__file__).parent, package)
     folder = package / "ready" / "kernels"
-    (folder / MADE_BY).write_text(json.dumps(described(folder) | {"whole": False}))
+    (folder / MADE_BY).write_text(json.dumps(described(folder) | {"whole": False, "kernels": "others"}))
     path = os.pathsep.join((str(tmp_path), str(ROOT)))
     environment = os.environ | {"PYTHONPATH": path, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     del environment["FLEXMB_KERNELS"]
