@@ -2,8 +2,8 @@
 
     python -m tests.flexmb.jit.code_budget    # write tests/flexmb/jit/code_budget.json anew
 
-All that an installation brings along is measured. How many bytes an instruction takes is a matter of the processor, so
-that sizes are compared on the one that the baseline is of.
+All that an installation brings along is measured. How many bytes a kernel takes is a matter of the processor, so that
+there is a baseline for each that was measured; which kernels there are, and in how many versions, is the same on all.
 """
 
 from __future__ import annotations
@@ -45,24 +45,36 @@ def measured(folder: Path) -> Codes:
     )
 
 
+def added(now: Codes, before: Codes) -> list[str]:
+    """Which kernels there were not, or are compiled more often, as sentences."""
+    return [
+        f"{name}: {len(sizes)} versions instead of {len(before.kernels.get(name, []))}"
+        for name, sizes in now.kernels.items()
+        if len(sizes) > len(before.kernels.get(name, []))
+    ]
+
+
 def grown(now: Codes, before: Codes) -> list[str]:
-    """Which kernels there were not, are compiled more often or have more code, as sentences."""
-    found = []
-    for name, sizes in now.kernels.items():
-        allowed = before.kernels.get(name, [])
-        if len(sizes) > len(allowed):
-            found.append(f"{name}: {len(sizes)} versions instead of {len(allowed)}")
-        found += [
-            f"{name}: {size} bytes instead of {most}"
-            for size, most in zip(reversed(sizes), reversed(allowed), strict=False)  # the largest with the largest
-            if size > SLACK * most + SMALL
-        ]
-    return found
+    """Which kernels have more code, as sentences."""
+    return [
+        f"{name}: {size} bytes instead of {most}"
+        for name, sizes in now.kernels.items()
+        for size, most in zip(reversed(sizes), reversed(before.kernels.get(name, [])), strict=False)  # largest first
+        if size > SLACK * most + SMALL
+    ]
 
 
-def baseline() -> Codes:
-    """What is stored."""
-    return msgspec.json.decode(BASELINE.read_bytes(), type=Codes)
+def baselines() -> list[Codes]:
+    """What is stored, for each processor that was measured, the last one first."""
+    return msgspec.json.decode(BASELINE.read_bytes(), type=list[Codes])
+
+
+def renewed(now: Codes, before: list[Codes]) -> list[Codes]:
+    """With new ones for this processor. Those for others stay where it has the same code as before, or had none: else
+    they are of other code."""
+    same = [codes.kernels == now.kernels for codes in before if codes.made == now.made]
+    others = [codes for codes in before if codes.made != now.made and not (added(now, codes) or added(codes, now))]
+    return [now, *(others if all(same) else [])]
 
 
 def main() -> None:
@@ -72,7 +84,8 @@ def main() -> None:
     folder = installed_directory()
     if folder is None or unfit():
         raise SystemExit(f"no kernels of this code: {unfit()}; python -m flexmb.ready.make flexmb/ready/kernels")
-    BASELINE.write_bytes(msgspec.json.format(msgspec.json.encode(measured(folder)), indent=1) + b"\n")
+    found = renewed(measured(folder), baselines())
+    BASELINE.write_bytes(msgspec.json.format(msgspec.json.encode(found), indent=1) + b"\n")
 
 
 if __name__ == "__main__":
