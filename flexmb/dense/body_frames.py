@@ -25,7 +25,8 @@ def section_frames(field: StrainField, eta: Jet) -> MovingFrame:
     rotations = list[Jet]()
     for j, before in enumerate(field.before):
         rotations.append(step[:, j] if before < 0 else rotations[before] @ step[:, j])
-    rotation = Jet(*(np.stack([getattr(R, part) for R in rotations], axis=1) for part in _PARTS))
+    value, rate, acceleration = (np.stack([getattr(R, part) for R in rotations], axis=1) for part in _PARTS)
+    rotation = Jet(value, rate, acceleration)
     tangent = turn(rotation[:, field.gauss], constant(field.tangent[field.gauss]) + stretch[:, field.gauss])
     change = tangent + constant(-field.tangent[field.gauss])
     moved = change.map(lambda x: np.einsum("jg,bga->bja", field.weight, x))
@@ -128,14 +129,14 @@ def on_body(seat: Seat, eta: Jet) -> MovingFrame:
     if seat.field is not None and node.section >= 0:
         section = section_frames(seat.field, eta[:, 0]).chosen(np.array([node.section]))
         return MovingFrame(section.position, section.rotation @ constant(node.rotation[None, None])).carry(fixed)
+    if not eta.value.shape[-1]:  # most bodies are rigid, and the exponential is expensive
+        return seat.undeformed
     moved = eta.map(lambda x: x @ node.translation.T)
-    rotation = constant(node.rotation[None, None])
-    if eta.value.shape[-1]:  # most bodies are rigid, and the exponential is expensive
-        turned = eta.map(lambda x: x @ node.rotation_modes.T)
-        if node.second is not None:
-            moved = moved + quadratic(node.second.translation, eta[..., None, :])
-            turned = turned + quadratic(node.second.rotation, eta[..., None, :])
-        rotation = rotation_exponential(turned) @ rotation
+    turned = eta.map(lambda x: x @ node.rotation_modes.T)
+    if node.second is not None:
+        moved = moved + quadratic(node.second.translation, eta[..., None, :])
+        turned = turned + quadratic(node.second.rotation, eta[..., None, :])
+    rotation = rotation_exponential(turned) @ constant(node.rotation[None, None])
     return MovingFrame(constant(node.position) + moved, rotation).carry(fixed)
 
 

@@ -17,6 +17,7 @@ from flexmb.scene.freedoms import Ball, Floating, Freedom, ScalarFreedom
 from flexmb.typing import Real
 
 Item = s.Hinge | s.PointMass
+UNMOVED, UNTURNED = constant(np.zeros((1, 1, 3))), constant(np.eye(3)[None, None])
 
 
 def hinge_sizes(hinge: Item) -> tuple[int, int]:
@@ -52,18 +53,19 @@ def _across(freedom: Freedom, c: Jet) -> MovingFrame:
 
 def rotated(*turns: tuple[ArrayLike, Jet]) -> MovingFrame:
     """Successive rotations about carried axes."""
-    rotation = constant(np.eye(3)[None, None])
+    rotation = UNTURNED
     for axis, angle in turns:
-        rotation = rotation @ rotation_about(axis, angle)
-    return MovingFrame(constant(np.zeros((1, 1, 3))), rotation)
+        about = rotation_about(axis, angle)
+        rotation = about if rotation is UNTURNED else rotation @ about
+    return MovingFrame(UNMOVED, rotation)
 
 
 def moved(*steps: tuple[ArrayLike, Jet]) -> MovingFrame:
     """A sum of translations along fixed axes."""
-    position = constant(np.zeros((1, 1, 3)))
+    position = UNMOVED
     for axis, distance in steps:
         position = position + product(np.multiply, constant(axis), distance[..., None])
-    return MovingFrame(position, constant(np.eye(3)[None, None]))
+    return MovingFrame(position, UNTURNED)
 
 
 def _floating(c: Jet) -> MovingFrame:

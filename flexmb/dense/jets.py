@@ -32,17 +32,19 @@ for _i in range(2):
 
 @dataclass(frozen=True)
 class Jet:
-    """x, dx/dt, d2x/dt2; their shapes broadcast."""
+    """x, dx/dt, d2x/dt2; their shapes broadcast. `still`: both derivatives are zero, and products leave them out."""
 
     value: Real
     rate: Real
     acceleration: Real
+    still: bool = False
 
     def __add__(self, other: Jet) -> Jet:
-        return Jet(self.value + other.value, self.rate + other.rate, self.acceleration + other.acceleration)
+        rate, acceleration = self.rate + other.rate, self.acceleration + other.acceleration
+        return Jet(self.value + other.value, rate, acceleration, self.still and other.still)
 
     def __neg__(self) -> Jet:
-        return Jet(-self.value, -self.rate, -self.acceleration)
+        return Jet(-self.value, -self.rate, -self.acceleration, self.still)
 
     def __matmul__(self, other: Jet) -> Jet:
         return product(np.matmul, self, other)
@@ -52,7 +54,7 @@ class Jet:
 
     def map(self, linear: Callable[[Real], Real]) -> Jet:
         """The jet of a constant linear function of x."""
-        return Jet(linear(self.value), linear(self.rate), linear(self.acceleration))
+        return Jet(linear(self.value), linear(self.rate), linear(self.acceleration), self.still)
 
     @property
     def transpose(self) -> Jet:
@@ -97,7 +99,11 @@ def constant(value: ArrayLike) -> Jet:
     """A jet with zero derivatives."""
     array = np.asarray(value)
     array = array.astype(np.result_type(array, float))  # complex numbers stay complex, for complex steps
-    return Jet(array, np.zeros_like(array), np.zeros_like(array))
+    zero = np.zeros(array.shape, array.dtype)
+    return Jet(array, zero, zero, True)
+
+
+ONE = constant(np.eye(3))
 
 
 def join(jets: list[Jet], motions: int) -> Jet:
@@ -110,9 +116,17 @@ def join(jets: list[Jet], motions: int) -> Jet:
 
 
 def product(operation: Callable[[Real, Real], Real], a: Jet, b: Jet) -> Jet:
-    """The jet of a bilinear operation, by Leibniz' rule."""
+    """The jet of a bilinear operation, by Leibniz' rule. Most frames are fixed in a body, so that terms with the
+    derivatives of constants would be most of the work."""
+    value = operation(a.value, b.value)
+    if a.still and b.still:
+        return constant(value)
+    if b.still:
+        return Jet(value, operation(a.rate, b.value), operation(a.acceleration, b.value))
+    if a.still:
+        return Jet(value, operation(a.value, b.rate), operation(a.value, b.acceleration))
     return Jet(
-        operation(a.value, b.value),
+        value,
         operation(a.rate, b.value) + operation(a.value, b.rate),
         operation(a.acceleration, b.value) + 2.0 * operation(a.rate, b.rate) + operation(a.value, b.acceleration),
     )
@@ -120,7 +134,11 @@ def product(operation: Callable[[Real, Real], Real], a: Jet, b: Jet) -> Jet:
 
 def turn(rotation: Jet, x: Jet) -> Jet:
     """R x for vectors (...,3)."""
-    return product(lambda R, v: np.einsum("...ij,...j->...i", R, v), rotation, x)
+    return product(_turned, rotation, x)
+
+
+def _turned(R: Real, v: Real) -> Real:
+    return np.asarray((R @ v[..., None])[..., 0])
 
 
 def scale(factor: Jet, matrix: Jet) -> Jet:
@@ -163,7 +181,7 @@ def rotation_exponential(theta: Jet) -> Jet:
     squared = product(lambda a, b: np.einsum("...i,...i->...", a, b), theta, theta)
     cross = theta.map(skew)
     sine, versine = (chain(f, df, d2f, squared) for f, df, d2f in polyval(squared.value, SERIES))
-    return constant(np.eye(3)) + scale(sine, cross) + scale(versine, cross @ cross)
+    return ONE + scale(sine, cross) + scale(versine, cross @ cross)
 
 
 def rotation_about(axis: ArrayLike, angle: Jet) -> Jet:
@@ -171,7 +189,7 @@ def rotation_about(axis: ArrayLike, angle: Jet) -> Jet:
     cross = skew(np.asarray(axis, dtype=float))
     s, c = np.sin(angle.value), np.cos(angle.value)  # not the series: the angle may count many turns
     sine, versine = chain(s, c, -s, angle), chain(1.0 - c, s, c, angle)
-    return constant(np.eye(3)) + scale(sine, constant(cross)) + scale(versine, constant(cross @ cross))
+    return ONE + scale(sine, constant(cross)) + scale(versine, constant(cross @ cross))
 
 
 SEPTIC = Polynomial([0.0, 0.0, 0.0, 0.0, 35.0, -84.0, 70.0, -20.0])

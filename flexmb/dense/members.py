@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from flexmb.dense.hinge_frames import hinge_sizes, rotation_of
+from flexmb.dense.jets import MovingFrame, constant
+from flexmb.kept import kept
 from flexmb.modal.flexible import flexible_model
 from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode
 from flexmb.modal.strain_field import StrainField
@@ -37,6 +39,12 @@ class Seat:
     offset: Real
     rotation: Real
     field: StrainField | None
+
+    @kept
+    def undeformed(self) -> MovingFrame:
+        """The frame seen from its body where this has no modes."""
+        node = MovingFrame(constant(self.node.position[None, None]), constant(self.node.rotation[None, None]))
+        return node.carry(MovingFrame(constant(self.offset), constant(self.rotation)))
 
 
 @dataclass(frozen=True)

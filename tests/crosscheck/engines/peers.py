@@ -1,5 +1,7 @@
 """Engines that may be missing here or decline a scene, and how far answers of two are apart."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -11,12 +13,19 @@ from flexmb.typing import Real
 
 def installed(name: str) -> Engine:
     """The engine, or a skip that says what is missing."""
-    found = engine(name)
+    if missing := _missing(name):
+        pytest.skip(missing)
+    return engine(name)
+
+
+@cache
+def _missing(name: str) -> str:
+    """Asked once: a library that is missing is looked for in all folders."""
     try:
-        found.version()
+        engine(name).version()
     except EngineMissing as missing:
-        pytest.skip(str(missing))
-    return found
+        return str(missing)
+    return ""
 
 
 def taking(name: str, scene: Scene) -> Engine:

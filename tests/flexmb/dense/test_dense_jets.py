@@ -1,12 +1,14 @@
 """Jets are what they say: each part is the derivative of the one before, on every path of the kinematics."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from flexmb.dense import DenseSystem
 from flexmb.dense.body_frames import Motions, member_frames, point_frames
-from flexmb.dense.jets import Jet, MovingFrame, profile, rotation_exponential
+from flexmb.dense.jets import Jet, MovingFrame, constant, profile, rotation_exponential, turn
 from flexmb.scene import schema as s
 from tests.bounds import UNIT_ROUNDOFF, observed_order
 from tests.trees import Recipe, random_scene
@@ -47,6 +49,19 @@ def test_profiles(function):
 def test_a_pulse_is_on_and_off():
     pulse = s.Pulse(value=3.0, start_s=1.0, duration_s=0.5)
     assert [float(profile(pulse, t).value) for t in (0.99, 1.0, 1.49, 1.5)] == [0.0, 3.0, 3.0, 0.0]
+
+
+def test_products_with_constants_are_those_of_jets_whose_derivatives_are_zero():
+    """To the bit; what moves is not said to be still. Negative control: a jet that only says so loses its rate."""
+    rng = np.random.default_rng(0)
+    R, x = (Jet(*rng.normal(size=(3, 4, *shape))) for shape in ((3, 3), (3,)))
+    fixed, place = constant(rng.normal(size=(3, 3))), constant(rng.normal(size=3))
+    for a, b in ((fixed, x), (R, place), (fixed, place), (-fixed, place + place), (fixed.transpose, x[..., ::-1])):
+        found, whole = turn(a, b), turn(replace(a, still=False), replace(b, still=False))
+        for part in ("value", "rate", "acceleration"):
+            assert np.array_equal(*np.broadcast_arrays(getattr(found, part), getattr(whole, part)))
+        assert found.still == (a.still and b.still) and not whole.still
+    assert not (place + x).still and not np.array_equal(turn(fixed, replace(x, still=True)).rate, turn(fixed, x).rate)
 
 
 @pytest.mark.parametrize("length", [0.0, 1e-9, 0.3, 2.0, np.pi])
