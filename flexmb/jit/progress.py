@@ -7,7 +7,8 @@ with it without a message.
 It is a warning of the logger `flexmb.jit`, which Python shows on stderr unless the program has set up its logging:
 `logging.getLogger("flexmb.jit").setLevel(logging.ERROR)` silences it.
 
-`spent` has the processor time of each kernel, which the installation keeps with what it has compiled.
+`spent` has the processor time of each kernel, which the installation keeps with what it has compiled. `unheard` is
+for its processes.
 """
 
 from __future__ import annotations
@@ -80,3 +81,15 @@ def _announce(function: FunctionType, folder: Path | None) -> None:
     if not why and not is_whole():
         why = " (`flexmb warmup --all` compiles all general kernels that the installation left for later)"
     _LOGGER.warning("flexmb is compiling %s (%s) for scenes of this kind, %s%s", which, purpose, how_often, why)
+
+
+def unheard() -> None:
+    """In a process that only compiles, nobody asks numba how long it held its locks: at each call of LLVM it notes that
+    once for every function whose compilation is not finished, which takes a fiftieth of compiling."""
+    from numba.core import event
+
+    event.start_event = event.end_event = _nobody_told
+
+
+def _nobody_told(*_: object, **__: object) -> None:
+    """In place of telling all who listen to an event."""

@@ -133,7 +133,7 @@ def _refuse_failures(used: Iterable[Used]) -> None:
 def _run(names: Sequence[str], processes: int, made: Path) -> list[Used]:
     """What the uses of these names have taken; kernels come into `made`."""
     start, used, before = perf_counter(), list[Used](), _kernels(made)
-    with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"), _without_events) as pool:
+    with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"), progress.unheard) as pool:
         left = {pool.submit(_use, name): name for name in names}
         while left:
             done = wait(left, SILENCE, FIRST_COMPLETED).done
@@ -184,18 +184,6 @@ def _names(first: bool) -> list[str]:
     from flexmb.ready.uses import FIRST, uses  # it imports numba, which must happen in the environment of the workers
 
     return list(FIRST) if first else [name for name, _ in uses()]
-
-
-def _without_events() -> None:
-    """In a process that only compiles, nobody asks numba how long it held its locks: at each call of LLVM it notes that
-    once for every function whose compilation is not finished, which takes a fiftieth of compiling."""
-    from numba.core import event
-
-    event.start_event = event.end_event = _unheard
-
-
-def _unheard(*_: object, **__: object) -> None:
-    """In place of telling all who listen to an event."""
 
 
 def _use(name: str) -> Used:

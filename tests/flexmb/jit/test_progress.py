@@ -8,6 +8,9 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
+from numba import njit
+from numba.core import event
+
 from flexmb.jit import progress
 from flexmb.jit.progress import announced
 
@@ -133,3 +136,18 @@ def busy(seconds: float) -> None:
     start = time.thread_time()
     while time.thread_time() < start + seconds:
         pass
+
+
+def test_a_process_that_only_compiles_tells_nobody_of_locks(monkeypatch) -> None:
+    """Negative control: otherwise who listens is told."""
+
+    def told() -> bool:
+        with event.install_recorder("numba:compiler_lock") as recorder:
+            njit(lambda x: x + 1)(1)
+        return bool(recorder.buffer)
+
+    monkeypatch.setattr(event, "start_event", event.start_event)
+    monkeypatch.setattr(event, "end_event", event.end_event)
+    assert told()
+    progress.unheard()
+    assert not told()

@@ -15,8 +15,6 @@ from time import sleep
 from types import SimpleNamespace
 
 import pytest
-from numba import njit
-from numba.core import event
 
 import flexmb
 from flexmb.jit import installed
@@ -148,21 +146,6 @@ def test_what_has_not_changed_is_not_made_again(tmp_path: Path, monkeypatch, cap
         changes()
     trouble = ""
     assert changes() and not changes()
-
-
-def test_a_process_that_only_compiles_tells_nobody_of_locks(monkeypatch) -> None:
-    """Negative control: otherwise who listens is told."""
-
-    def told() -> bool:
-        with event.install_recorder("numba:compiler_lock") as recorder:
-            njit(lambda x: x + 1)(1)
-        return bool(recorder.buffer)
-
-    monkeypatch.setattr(event, "start_event", event.start_event)
-    monkeypatch.setattr(event, "end_event", event.end_event)
-    assert told()
-    make._without_events()
-    assert not told()
 
 
 @whole
