@@ -330,4 +330,4 @@ def _rate(closures: Closures) -> Opening:
 
 
 def _largest(errors: Real) -> float:
-    return float(np.max(np.abs(errors), initial=0.0))
+    return float(np.abs(errors).max(initial=0.0))

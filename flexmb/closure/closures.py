@@ -159,7 +159,7 @@ class Closures:
     def chosen_in(s: Closed) -> Index:
         """Numbers of the independent rows that carry the loads at the motion evaluated last in a chain."""
         pairs = zip(s.cc.group["row_start"].tolist(), s.cw.rank.tolist(), strict=True)
-        return np.concatenate([np.zeros(0, np.int64), *(s.cw.chosen[at : at + rank] for at, rank in pairs)])
+        return np.concatenate([s.cw.chosen[at : at + rank] for at, rank in pairs])
 
     def expect_rows(self, s: Closed) -> None:
         """Have the next motion in a chain choose as many rows as are counted, or count them where they are not."""
@@ -313,14 +313,19 @@ class Closures:
 
     def rates(self) -> tuple[Real, float]:
         """Rates of the rows (G,), scaled as in `responses`, and the largest one relative to the speed of its ports."""
-        fastest = np.abs(self._scale("speed") * self._own.row["rate"])
-        return self._scale("size") * self._own.row["rate"], float(np.max(fastest, initial=0.0))
+        rate = self._own.row["rate"]
+        return self._scale("size") * rate, float(np.abs(self._scale("speed") * rate).max(initial=0.0))
 
     def _scale(self, key: str, largest: Real | float = np.inf) -> Real:
         c = self.constants[1]
         sizes = self._own.closure[key]
-        size = (sizes if largest is np.inf else np.minimum(sizes, largest))[c.row["closure"]]
-        return c.weight / np.where(size > 0.0, size, 1.0)
+        size = (sizes if largest is np.inf else np.minimum(sizes, largest)).take(self._closure_of_row)
+        size[~(size > 0.0)] = 1.0
+        return c.weight / size
+
+    @kept
+    def _closure_of_row(self) -> Index:
+        return np.array(self.constants[1].row["closure"])
 
     def moved(self, t: float, y: Real, x: Real) -> Real:
         """y displaced by the motion M^-1 J' of x; the row values are evaluated at the result."""
@@ -413,8 +418,8 @@ class Closures:
     def half_turned(self) -> list[str]:
         """Names of the closures of which axes that they keep parallel are opposite."""
         which, places = self._kept_parallel
-        opposite = which[self._own.closure["rotation"][which, places] < 0.0].tolist()
-        return list(dict.fromkeys(self.scene[i].name for i in opposite))
+        opposite = self._own.closure["rotation"][which, places] < 0.0
+        return list(dict.fromkeys(self.scene[i].name for i in which[opposite].tolist())) if opposite.any() else []
 
     @kept
     def _kept_parallel(self) -> tuple[Index, Index]:

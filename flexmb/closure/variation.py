@@ -36,6 +36,8 @@ from flexmb.jit.direct import Direct, direct
 from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR
 from flexmb.kept import kept
 from flexmb.tables.functions import any_varies
+from flexmb.tables.state import finite_result
+from flexmb.tables.status import OK
 from flexmb.typing import Index, Real
 
 
@@ -59,6 +61,7 @@ class ChainVariation:
         rows = s.c, dual, s.cc, self._rows
         self._differentiate_by_time = direct(change_by_time, STATUS, REAL, VECTOR, VECTOR, VECTOR, *rows)
         self._held: Index = np.flatnonzero(s.c.speed["prescribed"] >= 0)
+        self._varies = any_varies(s.c.function)
 
     @property
     def doubt(self) -> Index:
@@ -82,11 +85,11 @@ class ChainVariation:
             none,
         )  # fmt: skip
         whole = FreeVariation(*found, rows)
-        return self._with_time(t, y, whole) if any_varies(s.c.function) else whole
+        return self._with_time(t, y, whole) if self._varies else whole
 
     def of_accelerations(self, t: float, y: Real) -> VariedAccelerations:
         """The same without the rows, which functions of time alone need for the accelerations."""
-        if any_varies(self._chain.c.function):
+        if self._varies:
             return VariedAccelerations(*self.at(t, y)[:3])
         return self._differentiated(t, y)
 
@@ -94,7 +97,9 @@ class ChainVariation:
         """The same with functions of time held at their values; the rows are then in the tables."""
         x = self._x
         self._closures.expect_rows(self._chain)
-        self._closures.check(self._differentiate(t, y), int(x.fault[0]))
+        status = self._differentiate(t, y)
+        if status != OK:
+            self._closures.check(status, int(x.fault[0]))
         rates = x.speed["acceleration"].copy()
         of_rates = ByAllDirections(x.by_displacement.copy(), x.by_speed.copy(), x.by_force.copy(), np.zeros(len(rates)))
         return VariedAccelerations(rates, of_rates, self.motion.at(y))
@@ -117,7 +122,7 @@ class ChainVariation:
         n, rows, nu = len(y), found.rows, len(found.accelerations)
         out = np.zeros(n + 2 * len(rows.loads))
         self._closures.check(self._differentiate_by_time(t, y, rows.loads, out), int(self._dual.fault[0]))
-        free, (of_row_rates, opening) = out[n - 1 - nu : n - 1], np.split(out[n:], 2)
+        free, (of_row_rates, opening) = finite_result(out, t)[n - 1 - nu : n - 1], np.split(out[n:], 2)
         return found._replace(
             of_accelerations=found.of_accelerations._replace(by_time=free - rows.lever @ opening),
             rows=rows._replace(

@@ -42,9 +42,9 @@ class DerivativeCall:
         return self.w.fault
 
 
-def derivative_call(c: Constants, nq: int, nu: int) -> DerivativeCall:
-    """A bundle for calls of `differentiate`; one per thread."""
-    w = derivative_workspace(c, nq, nu)
+def derivative_call(c: Constants, nq: int, nu: int, w: DerivativeWorkspace | None = None) -> DerivativeCall:
+    """A bundle for calls of `differentiate`, in this workspace or one of its own; one per thread."""
+    w = derivative_workspace(c, nq, nu) if w is None else w
     behind = addresses(acceleration_derivatives, STATUS, REAL, VECTOR, MATRIX, MATRIX, MATRIX, c, w)
     results = (np.zeros((nu, nu)) for _ in range(3))
     return DerivativeCall(*results, np.array(behind, np.int64), w)

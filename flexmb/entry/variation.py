@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.entry.derivatives import DerivativeWorkspace, acceleration_derivatives, stiffness_and_mass
+from flexmb.entry.derivative_call import derivative_call, differentiate
+from flexmb.entry.derivatives import DerivativeWorkspace, stiffness_and_mass
 from flexmb.entry.tangent import TangentWorkspace, time_derivative
 from flexmb.jit.bundle import bundle
 from flexmb.jit.direct import Direct, direct
@@ -20,6 +21,8 @@ from flexmb.kept import kept
 from flexmb.motion.coordinates import configuration_rate
 from flexmb.tables.arrays import Constants
 from flexmb.tables.functions import any_varies
+from flexmb.tables.state import finite_result
+from flexmb.tables.status import OK
 from flexmb.typing import Index, Real
 
 MOST_SPEEDS = 6  # of a hinge
@@ -143,9 +146,11 @@ class TreeVariation:
     def __init__(self, c: Constants, w: DerivativeWorkspace, dual: TangentWorkspace, check: Check) -> None:
         self._w, self._dual, self._check, n = w, dual, check, len(c.speed)
         self.motion = CoordinateMotion(c, len(w.sweeps.q))
-        self._differentiate = direct(acceleration_derivatives, STATUS, REAL, VECTOR, MATRIX, MATRIX, MATRIX, c, w)
+        self._call = derivative_call(c, len(w.sweeps.q), n, w)
+        self._differentiate = direct(differentiate, STATUS, REAL, VECTOR, c, self._call)
         self._differentiate_by_time = direct(time_derivative, STATUS, REAL, VECTOR, VECTOR, c, dual)
-        self._constants = c
+        self._constants, self._varies = c, any_varies(c.function)
+        self._rates = w.sweeps.speed["acceleration"]
         none, loads = np.zeros((0, n)), np.zeros(0)
         of_loads = ByAllDirections(none, none, none, loads)
         self._no_rows = RowChanges(loads, of_loads, np.zeros(0, np.int64), none.T, none, none, loads)
@@ -162,14 +167,16 @@ class TreeVariation:
     def of_accelerations(self, t: float, y: Real) -> VariedAccelerations:
         """The same without rows."""
         nu = len(self._w.sweeps.u)
-        by_state_and_force = np.empty((nu, nu)), np.empty((nu, nu)), np.empty((nu, nu))
-        self._check(self._differentiate(t, y, *by_state_and_force), int(self._w.fault[0]))
-        rates, by_time = self._w.sweeps.speed["acceleration"].copy(), np.zeros(nu)
-        if any_varies(self._constants.function):
+        status, x = self._differentiate(t, y), self._call
+        if status != OK:
+            self._check(status, int(self._w.fault[0]))
+        rates, by_time = self._rates.copy(), np.zeros(nu)
+        if self._varies:
             drift = np.empty_like(y)
             self._check(self._differentiate_by_time(t, y, drift), int(self._dual.fault[0]))
-            by_time = drift[-1 - nu : -1]
-        return VariedAccelerations(rates, ByAllDirections(*by_state_and_force, by_time), self.motion.at(y))
+            by_time = finite_result(drift, t)[-1 - nu : -1]
+        of_rates = ByAllDirections(x.by_displacement.copy(), x.by_speed.copy(), x.by_force.copy(), by_time)
+        return VariedAccelerations(rates, of_rates, self.motion.at(y))
 
     @kept
     def _stiffen(self) -> Direct:

@@ -24,7 +24,7 @@ from flexmb.closure.closures import ClosureError, Closures
 from flexmb.closure.factor import DEPENDENT
 from flexmb.closure.tables import ClosureConstants
 from flexmb.closure.variation import ChainVariation
-from flexmb.linear.triangular import backward, forward, pivots
+from flexmb.linear.triangular import backward, factor, forward, pivots, singular
 from flexmb.linear.variations import Equations, RestForces, Variations, same_structure
 from flexmb.system.pushforward import GivenMotion
 from flexmb.system.system import System
@@ -43,7 +43,7 @@ class _Freedom(NamedTuple):
 
     def independent(self) -> Index:
         """Indices (f,) of the independent coordinates."""
-        weighed = np.sqrt(np.diag(self.mass))[:, None] * self.null
+        weighed = np.sqrt(self.mass.diagonal())[:, None] * self.null
         return np.sort(pivots(weighed.T)[: self.null.shape[1]])
 
     def basis(self, chosen: Index) -> Real:
@@ -123,16 +123,18 @@ class ClosedEquations(Equations):
             return x - N @ x[chosen]
 
         T = dependent(-P @ rates_by_displacement @ N)
-        carried = dependent(P @ J @ state.u[free])  # displacement per second by prescribed motions
-        hurried = dependent(-P @ (found.rows.rates_by_time + rates_by_displacement @ carried))
-        by_speed = of_rates.by_speed[both]
+        by_speed, drift = of_rates.by_speed[both], of_rates.by_time[free]
+        if len(self.constants.function):  # otherwise nothing is prescribed, and the speeds keep the closures closed
+            carried = dependent(P @ J @ state.u[free])  # displacement per second by prescribed motions
+            hurried = dependent(-P @ (found.rows.rates_by_time + rates_by_displacement @ carried))
+            drift = drift + by_displacement @ carried + by_speed @ hurried
         by_chosen = np.zeros((2 * n, 2 * f))
         by_chosen[:n, :f] = by_chosen[n:, f:] = N
         by_chosen[n:, :f] = T
         return Variations(
             state, found, found.accelerations[free][chosen],
             (by_displacement @ N + by_speed @ T)[chosen], (by_speed @ N)[chosen],
-            (of_rates.by_time[free] + by_displacement @ carried + by_speed @ hurried)[chosen],
+            drift[chosen],
             self._transport(state.u)[chosen] @ N, found.motion[:, free] @ N, N.T @ left.mass @ N, chosen,
             self.movable(chosen), by_chosen,
         )  # fmt: skip
@@ -153,8 +155,8 @@ class ClosedEquations(Equations):
         """DynamicsError at a singular position."""
         rank = self.rank
         weight = self._closures.constants[1].weight  # of rotations against translations
-        root = np.linalg.cholesky(mass)
-        _, S, Vt = np.linalg.svd(weight[:, None] * forward(root, J.T).T)
+        root = factor(mass)
+        S, Vt = singular(weight[:, None] * forward(root, J.T).T)
         if rank and not S[rank - 1] > DEPENDENT * S[0]:
             raise DynamicsError("the closures suppress fewer motions here than elsewhere: a singular position")
         return _Freedom(mass, backward(root, Vt[rank:].T))

@@ -14,8 +14,9 @@ from scipy.linalg import eig, matrix_balance
 from flexmb.kept import kept
 from flexmb.output.files import whole_file
 from flexmb.tables import arguments
-from flexmb.tables.named import brief
-from flexmb.tables.state import State
+from flexmb.tables.brief import brief
+from flexmb.tables.soundness import unsound
+from flexmb.tables.state import NO_QUATERNIONS, State
 from flexmb.typing import Real
 
 Complex = NDArray[np.complex128]
@@ -122,13 +123,13 @@ class LinearModel:
 
     def __post_init__(self) -> None:
         own = {name: np.array(getattr(self, name), float) for name in self._refuse_torn()}
-        if not np.isfinite(np.concatenate([array.ravel() for array in own.values()])).all():
+        if any(unsound(array.ravel(), NO_QUATERNIONS) for array in own.values()):
             # The row of an undetermined output is NaN as a whole: a NaN beside numbers is a fault.
             determined = ~np.all(np.isnan(np.hstack([own["C"], own["D"]])), 1)
             for name, array in own.items():
                 arguments.finite(name, np.where(determined[:, None], array, 0.0) if name in "CD" else array)
         for array in own.values():
-            array.flags.writeable = False
+            array.setflags(write=False)
         self.__dict__.update(own)
 
     def _refuse_torn(self) -> Iterable[str]:

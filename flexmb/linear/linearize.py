@@ -49,7 +49,8 @@ def linearize(system: System | Scene, state: State | None = None, *, held: bool 
         return model
     equations, state = entering(system, state)
     equations = equations.held(state.t) if held else equations
-    state = equations.on_functions(state)
+    if held or equations.system.constraints is None:  # states that enter for a closed chain are on its functions
+        state = equations.on_functions(state)
     warn(looked_at([(equations, state)]))
     return linear_model(equations, state)
 
@@ -69,17 +70,17 @@ def linear_model(equations: Equations, state: State) -> LinearModel:
     """The model of equations whose functions of time are already held or replaced as wanted, at a state on these."""
     system, labels = equations.system, equations.labels
     system.refuse_corners(*system.layout.entering(state))
-    at, n, every = equations.variations(state), equations.freedom, len(equations.free)
-    A, driven = finite_result(at.A, state.t), labels.driven
+    at, n, free = equations.variations(state), equations.freedom, equations.free
+    A, driven, markers = finite_result(at.A, state.t), labels.driven, labels.markers
     for part in (at.drift, at.rates):
         finite_result(part, state.t)
-    B = np.zeros((2 * n, len(driven)))
-    B[n:] = np.linalg.solve(at.mass, at.basis[driven].T)
-    is_state = np.zeros(2 * every, bool)
-    is_state[at.chosen] = is_state[every + at.chosen] = True
-    names, markers = (*labels.displacements, *labels.speeds), labels.markers
-    states, dependent = (tuple(names[i] for i in np.flatnonzero(among).tolist()) for among in (is_state, ~is_state))
-    C = np.vstack([np.eye(2 * n), at.by_chosen[~is_state], _markers(equations, at)])
+    states, dependent, places = equations.state_names(at.chosen)
+    B, few, all_but_markers = np.zeros((2 * n, len(driven))), len(states), len(states) + len(dependent)
+    B[n:] = at.free.of_accelerations.by_force[free[at.chosen]][:, free[driven]]
+    C = np.zeros((all_but_markers + len(markers), 2 * n))
+    C.ravel()[: few * few : few + 1] = 1.0
+    C[few:all_but_markers] = at.by_chosen[places]
+    C[all_but_markers:] = _markers(equations, at)
     D = np.zeros((len(C), len(driven)))
     if system.scene.sensors:
         from flexmb.linear.sensed import of_sensors  # imported only for scenes with sensors

@@ -25,7 +25,7 @@ from flexmb.entry.derivatives import DerivativeWorkspace, derivative_workspace
 from flexmb.entry.tangent import TangentWorkspace, tangent_workspace
 from flexmb.entry.variation import FreeVariation, TreeVariation
 from flexmb.kept import kept
-from flexmb.linear.labels import ModelLabels, model_labels
+from flexmb.linear.labels import ModelLabels, Name, model_labels
 from flexmb.scene.functions import Constant, Function, Ramp
 from flexmb.system.pushforward import GivenMotion, Pushforward, pushforward
 from flexmb.system.system import System
@@ -73,10 +73,20 @@ class Variations(NamedTuple):
     def A(self) -> Real:
         """(2n,2n) matrix of d[xi; du]/dt."""
         n = len(self.rates)
-        found = np.empty((2 * n, 2 * n))
-        found[:n, :n], found[:n, n:] = self.transport, np.eye(n)
+        found = np.zeros((2 * n, 2 * n))
+        found[:n, :n] = self.transport
+        found.ravel()[n : 2 * n * n : 2 * n + 1] = 1.0  # xi' = du
         found[n:, :n], found[n:, n:] = self.by_displacement, self.by_speed
         return found
+
+
+class StateNames(NamedTuple):
+    """Names and units of the states of a linear model, and of the dependent displacements and speeds, which are at
+    these places among all."""
+
+    states: tuple[Name, ...]
+    dependent: tuple[Name, ...]
+    places: Index
 
 
 class RestForces(NamedTuple):
@@ -121,11 +131,24 @@ class Equations:
         self._as_system = same_structure(self.constants, system.constants)
         shared = like is not None and same_structure(self.constants, like.constants)
         self._root: Equations = like._root if like is not None and shared else self
+        self._named: tuple[bytes, StateNames] | None = None
 
     @kept
     def labels(self) -> ModelLabels:
         """Names and units in the linear models of all equations of this structure."""
         return self._root.labels if self._root is not self else model_labels(self.system, self.constants, self.free)
+
+    def state_names(self, chosen: Index) -> StateNames:
+        """By the numbers (f,) of the independent speeds among the free ones; those of the last choice are kept."""
+        root, key = self._root, chosen.tobytes()
+        known = root._named  # read once: another thread may put that of another choice in its place
+        if known is None or known[0] != key:
+            n, names = len(root.free), (*root.labels.displacements, *root.labels.speeds)
+            states = [*chosen.tolist(), *(n + chosen).tolist()]
+            places = np.array(sorted(set(range(2 * n)) - set(states)), np.int64)
+            named = StateNames(tuple(names[i] for i in states), tuple(names[i] for i in places.tolist()), places)
+            root._named = known = key, named
+        return known[1]
 
     @property
     def freedom(self) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
@@ -224,11 +224,14 @@ class Trajectory(RunArrays):
         return write_plots(self, Path(folder))
 
 
+ROTATIONS = 100_000  # of markers that become quaternions together, which takes four times their memory
+
+
 def gathered(observation: Observation, rows: Real) -> dict[str, Any]:
     """The fields of a `Trajectory` that are observables, from rows (T,width)."""
     names, found = observation.names, observation.columns_of(rows)
     return {
-        "markers": {name: _marker_path(found["markers"][:, i]) for i, name in enumerate(names.markers)},
+        "markers": _marker_paths(names.markers, found["markers"]),
         "loads": _by_name(names.hinges, found["loads"]) | _by_name(names.closures, found["closures"]),
         "wheel_loads": _by_name(names.wheels, found["wheel_loads"]),
         "drives": {name: found["drives"][:, places] for name, places in names.driven.items()},
@@ -244,20 +247,27 @@ def _by_name(names: Sequence[str], values: Real) -> dict[str, Real]:
     return {name: values[:, i].copy() for i, name in enumerate(names)}
 
 
-def _marker_path(rows: Real) -> MarkerPath:
-    """The path of a marker from rows (T,24) as in `Outputs`."""
-    return MarkerPath(
-        position=rows[:, :3].copy(),
-        quaternion=_continuous_quaternions(rows[:, 3:12].reshape(-1, 3, 3)),
-        velocity=rows[:, 12:18].copy(),
-        acceleration=rows[:, 18:24].copy(),
-    )
+def _marker_paths(names: Iterable[str], rows: Real) -> dict[str, MarkerPath]:
+    """The paths of K markers by name, from rows (T,K,24) as in `Outputs`."""
+    names, together = list(names), max(1, ROTATIONS // max(1, len(rows)))
+    paths = {}
+    for first in range(0, len(names), together):
+        some = slice(first, first + together)
+        turned = _continuous_quaternions(rows[:, some, 3:12].reshape(len(rows), -1, 3, 3))
+        for i, name in enumerate(names[some]):
+            path = rows[:, first + i]
+            paths[name] = MarkerPath(
+                position=path[:, :3].copy(), quaternion=turned[:, i].copy(), velocity=path[:, 12:18].copy(),
+                acceleration=path[:, 18:24].copy(),
+            )  # fmt: skip
+    return paths
 
 
 def _continuous_quaternions(rotations: Real) -> Real:
-    """Scalar-first quaternions of (T,3,3) rotations, each with the sign that is closer to the one before."""
-    if not len(rotations):
-        return np.empty((0, 4))
+    """Scalar-first quaternions (T,K,4) of (T,K,3,3) rotations, each with the sign that is closer to the one before."""
+    if not rotations.size:
+        return np.empty((*rotations.shape[:2], 4))
     quaternions = quaternion_of(rotations)
-    turns = np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0.0
-    return quaternions * np.cumprod(np.r_[1.0, np.where(turns, -1.0, 1.0)])[:, None]
+    turns = np.sum(quaternions[1:] * quaternions[:-1], axis=-1) < 0.0
+    quaternions[1:] *= np.cumprod(np.where(turns, -1.0, 1.0), axis=0)[..., None]
+    return quaternions

@@ -81,8 +81,11 @@ def refuse_bytes(size: float, what: str, remedy: str) -> None:
 
 def refuse_large_matrix(n: int, what: str, remedy: str, matrices: int = 1) -> None:
     """ValueError if so many matrices (n,n) of real numbers would exceed MOST_BYTES."""
+    size = 8.0 * matrices * n**2
+    if size <= MOST_BYTES:
+        return  # before any words are made: each public call of one state asks
     some = "a matrix" if matrices == 1 else f"{matrices} matrices"
-    refuse_bytes(8.0 * matrices * n**2, f"{what} would need {some} of {n} x {n} numbers, which take", remedy)
+    refuse_bytes(size, f"{what} would need {some} of {n} x {n} numbers, which take", remedy)
 
 
 def modes_memory(level: Level, points: float, modes: int) -> float:

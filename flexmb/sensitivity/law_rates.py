@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import msgspec
 import numpy as np
 
 from flexmb.control.wiring import law_numbers, profile_tables, wired
 from flexmb.parameters.numbers import Number
 from flexmb.parameters.spectral import Parts, derivative
-from flexmb.scene.check.walk import values
-from flexmb.scene.convert import ROOT
 from flexmb.scene.events import Impact
 from flexmb.scene.functions import ControlSignal
+from flexmb.scene.keys import struct_keys
 from flexmb.scene.schema import Scene
 from flexmb.system.system import System
 from flexmb.typing import Real
@@ -102,8 +102,15 @@ def _concerned(numbers: Sequence[Number | None], scene: Scene) -> list[bool | No
     return found
 
 
-def _driven_gains(scene: Scene) -> list[float]:
-    return [function.gain for _, _, function in values(ROOT, scene) if isinstance(function, ControlSignal)]
+def _driven_gains(item: Any) -> list[float]:
+    """Gains of all signals in a scene, a struct or a tuple of structs."""
+    if isinstance(item, ControlSignal):
+        return [item.gain]
+    if isinstance(item, msgspec.Struct):
+        item = tuple(getattr(item, key) for key in struct_keys(type(item)))
+    elif not (isinstance(item, tuple) and item and isinstance(item[0], msgspec.Struct)):
+        return []
+    return [gain for each in item for gain in _driven_gains(each)]
 
 
 def _by_numbers(

@@ -85,7 +85,7 @@ class Constraints:
     def _as_asked(self, t: float, y: Real, wish: AskedFor) -> Real:
         """y = [q, u, work] with closed closures; warns of values that it cannot keep."""
         state = consistent(self.closures, t, y, wish)
-        broken = wish.broken(y, state)
+        broken = "" if np.array_equal(y, state) else wish.broken(y, state)
         if broken:
             warnings.warn(
                 f'scene "{self._system.scene.name}": the closures do not allow these values together, and the nearest '
@@ -104,7 +104,7 @@ class Constraints:
         t, rough = self._system.layout.entering(state)
         self.closures.linearise(t, rough)
         errors = self.closures.errors()
-        if not np.max(np.abs(errors), initial=0.0) <= LARGEST_INITIAL_GAP:
+        if not np.abs(errors).max(initial=0.0) <= LARGEST_INITIAL_GAP:
             raise ClosureError(
                 f"{self.closures.worst(errors)}: the state that is given leaves this open: give coordinates that close "
                 "it at least roughly, or leave those out that the closures determine"

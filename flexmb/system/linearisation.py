@@ -64,7 +64,8 @@ class Linearisation:
         t, y = self._differentiable(state, "system.acceleration_derivatives")
         at: FreeVariation | VariedAccelerations
         if forces is None:
-            at = self._sound(t, y, self._variations.of_accelerations(t, y))
+            variations = self._variations
+            at = self._sound(t, y, variations.of_accelerations(t, y), variations)
         else:
             at = self._under_forces(self._variation(t, y), t, y, self._system.layout.rates("forces", forces))
         return AccelerationDerivatives(at.accelerations, *at.of_accelerations, at.motion)
@@ -132,13 +133,14 @@ class Linearisation:
 
     def _variation(self, t: float, y: Real) -> FreeVariation:
         """How the free motion changes."""
-        return self._sound(t, y, self._variations.at(t, y))
+        variations = self._variations
+        return self._sound(t, y, variations.at(t, y), variations)
 
-    def _sound(self, t: float, y: Real, found: _Varied) -> _Varied:
-        """The motion itself; a warning or DynamicsError where rounding leaves few digits or numbers overflow."""
-        self._system.check_precision(t, y, self._variations)
-        for part in (found.accelerations, *found.of_accelerations):  # loads of rows that overflow overflow these
-            finite_result(part, t)
+    def _sound(self, t: float, y: Real, found: _Varied, variations: TreeVariation | ChainVariation) -> _Varied:
+        """The motion itself, whose derivatives are finite; a warning or DynamicsError where rounding leaves few digits
+        or the accelerations overflow."""
+        self._system.check_precision(t, y, variations)
+        finite_result(found.accelerations, t)
         return found
 
     @per_thread

@@ -84,7 +84,7 @@ class Pushforward:
             self._set(at, directions, some, lanes)
             self._check(self._observe(), int(self.w.fault[0]))
             derivatives.append(np.array(read(lanes)))
-        return np.hstack(derivatives)
+        return derivatives[0] if len(derivatives) == 1 else np.hstack(derivatives)
 
     def value(self, at: GivenMotion) -> Real:
         """The row (E,) of a motion."""

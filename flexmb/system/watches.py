@@ -22,6 +22,7 @@ from flexmb.tables.state import State
 from flexmb.typing import Real
 
 _NONE: Real = np.zeros((0, 0))
+_NOTHING = np.zeros(0), _NONE, _NONE
 
 
 class WatchedStates(NamedTuple):
@@ -204,7 +205,7 @@ def of_states(system: System, states: Sequence[State], turns: Callable[[int], Re
     """States of a system that are no samples of a run; turns: see `WatchedStates`, by the functions of time of the
     system if left out. None are looked at where all bodies are rigid."""
     states = () if system.is_rigid else states
-    t, q, u = (np.array([getattr(state, key) for state in states]) for key in ("t", "q", "u"))
+    t, q, u = (np.array([getattr(state, key) for state in states]) for key in ("t", "q", "u")) if states else _NOTHING
     loads = _loads(system, states) if len(system.constants.section) and not system.scene.controllers else None
     return WatchedStates(system, t, q, u, turns or (lambda n: system.turns(float(t[n]), q[n], u[n])), loads=loads)
 

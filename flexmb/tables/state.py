@@ -17,7 +17,7 @@ from flexmb.tables.soundness import LONGEST, SHORTEST, unsound
 from flexmb.tables.status import Status
 from flexmb.typing import Index, Real
 
-_NONE: Index = np.zeros(0, np.int64)
+NO_QUATERNIONS: Index = np.zeros(0, np.int64)
 
 
 class DynamicsError(ArithmeticError):
@@ -189,7 +189,7 @@ class Layout:
     def rates(self, name: str, values: Any) -> Real:
         """(nu,) numbers, finite."""
         found = arguments.vector(name, values, self.nu)
-        return arguments.finite(name, found) if unsound(found, _NONE) else found
+        return arguments.finite(name, found) if unsound(found, NO_QUATERNIONS) else found
 
     def _examine(self, y: Real) -> None:
         """Raise the ValueError for the entry that `unsound` has found."""
@@ -204,7 +204,7 @@ class Layout:
 
 def finite_result(result: Real, t: float) -> Real:
     """The result (any shape) itself; DynamicsError if an entry is not finite."""
-    if unsound(result if result.ndim == 1 else result.ravel(), _NONE):
+    if unsound(result if result.ndim == 1 else result.ravel(), NO_QUATERNIONS):
         raise NotFiniteError(
             f"the result at t = {t:g} s is not finite: coordinates, speeds, accelerations or functions of time are so "
             "large that their products overflow"

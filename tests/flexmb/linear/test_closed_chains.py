@@ -89,6 +89,18 @@ def test_derivatives_are_those_of_the_closed_chain(name):
     assert np.array_equal(model.A[:n], np.eye(n, 2 * n, n))
 
 
+@pytest.mark.parametrize("name", MOVING)
+def test_forces_drive_as_the_mass_of_the_allowed_motions_says(name):
+    """B holds derivatives by forces; mass and dependent displacements of the model have them once more."""
+    model = fm.linearize(fm.compile(MOVING[name]()))
+    moved = model.displacements_by([name for name, _ in model.inputs])
+    expected = np.linalg.solve(model.mass, moved.T)
+    n, scale = len(model.rates), np.max(np.abs(expected))
+    assert not model.B[:n].any()
+    assert np.max(np.abs(model.B[n:] - expected)) < 1e-10 * scale
+    assert np.max(np.abs(moved.T - expected)) > 1e-3 * scale  # a control: with masses left out it is another one
+
+
 def refused(*_):
     raise AssertionError("this is not asked for")
 
@@ -319,7 +331,9 @@ def test_a_locked_mechanism_rests_where_it_is():
     system = fm.compile(m.four_bar(prescribed=s.Constant(value=1.0)))
     found = fm.equilibrium(system)
     assert found.q == pytest.approx(system.initial_state.q, abs=1e-13)
-    assert fm.linearize(system, found).A.shape == (0, 0)
+    model, dependent = fm.linearize(system, found), ["pin.rotation", "pivot.rotation"]
+    assert model.A.shape == (0, 0)
+    assert [name for name, _ in model.outputs[:4]] == dependent + [f"{name}.rate" for name in dependent]
 
 
 def test_truncation_of_a_closed_chain():

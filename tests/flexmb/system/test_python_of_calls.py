@@ -42,8 +42,8 @@ CALLS: dict[str, Callable[[fm.System], object]] = {
     "simulate": lambda system: fm.simulate(system, 1e-6, samples=2),
 }
 MOST = {
-    "chain of ten": {"acceleration_derivatives": 40, "linearize": 120, "simulate": 190},
-    "four-bar": {"acceleration_derivatives": 45, "linearize": 170, "simulate": 300},
+    "chain of ten": {"acceleration_derivatives": 30, "linearize": 100, "simulate": 190},
+    "four-bar": {"acceleration_derivatives": 32, "linearize": 120, "simulate": 300},
 }
 
 
