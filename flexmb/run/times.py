@@ -39,10 +39,10 @@ def sample_times(samples: int | Sequence[float] | Real, t_end: float, t_start: f
         if number < 2:
             raise ValueError(f"samples is {number}: ask for at least 2 output times, the start and the end")
         _refuse_samples(number, _SAMPLE_BYTES)
-        times = np.arange(number) * ((t_end - t_start) / (number - 1)) + t_start  # `linspace` takes three times as long
-        times[-1] = t_end
-        if _increase(times):
-            return times
+        equal: Real = np.arange(float(number)) * ((t_end - t_start) / (number - 1)) + t_start  # as `linspace`, sooner
+        equal[-1] = t_end
+        if _increase(equal):
+            return equal
         raise ValueError(f"samples is {number}: too many to be distinct from {t_start:g} to t_end = {t_end:g} s")
     times = arguments.array("samples", samples)
     increasing = times.ndim == 1 and len(times) > 1 and _increase(times)

@@ -253,7 +253,7 @@ def _marker_paths(names: Iterable[str], rows: Real) -> dict[str, MarkerPath]:
     paths = {}
     for first in range(0, len(names), together):
         some = slice(first, first + together)
-        turned = _continuous_quaternions(rows[:, some, 3:12].reshape(len(rows), -1, 3, 3))
+        turned = _continuous_quaternions(rows[:, some, 3:12].reshape(len(rows), len(names[some]), 3, 3))
         for i, name in enumerate(names[some]):
             path = rows[:, first + i]
             paths[name] = MarkerPath(

@@ -89,9 +89,9 @@ REASONS = (
         ("sensitivity_1",),
         "a dual number holds seven derivatives: by one number the equations cost what they cost by seven, three times "
         "those of the motion (5.8 µs against 1.9), in as many steps (5730 against 5950: accuracy bounds both), beside "
-        "the run itself. Other kernels of today are no cheaper: the whole Jacobian by recursion takes 9.2 µs, all outputs "
-        "of a given motion in duals 7.1. Of the time beyond the run an eighth is Python. Narrower duals would be a "
-        "second set of kernels; a single pass for values and derivatives would take other steps than `simulate` does.",
+        "the run itself. Other kernels of today are no cheaper: the whole Jacobian by recursion takes 9.2 µs, all "
+        "outputs of a given motion in duals 7.1. Of the time beyond the run an eighth is Python. Narrower duals would "
+        "be a second set of kernels; one pass for values and derivatives would take other steps than `simulate` does.",
     ),
     Reason(
         ("ffrf_beam_0.01", "ffrf_beam_0.001", "ffrf_beam_0.0001"),

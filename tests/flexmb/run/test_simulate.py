@@ -6,11 +6,13 @@ import tracemalloc
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from msgspec import structs
 
 import flexmb as fm
 from flexmb.integrate.catalogue import INTEGRATORS
-from flexmb.run import plots
-from flexmb.run.times import sample_bytes, timing
+from flexmb.run import plots, trajectory
+from flexmb.run.samples import sample_bytes, sample_times
+from flexmb.run.switching import timing
 from flexmb.tables.status import Status
 from tests.benchmarks.rivals import rigid_chain
 from tests.trees import random_scene
@@ -222,3 +224,25 @@ def test_plots_are_written(tmp_path):
     paths = fm.simulate(driven_arm(), 0.5, samples=5).plot(tmp_path / "charts")
     assert {path.name for path in paths} == {"markers.png", "energy.png", "momentum.png", "loads.png", "drives.png"}
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in paths)
+
+
+def test_markers_become_quaternions_together_or_in_parts(monkeypatch) -> None:
+    """The same path for each of them, whatever is beside it; none is shorter than the samples, of which there may be
+    none."""
+    scene = tumbling_pair()
+    other = structs.replace(scene.markers[0], name="other", body="a")
+    system = fm.compile(structs.replace(scene, markers=(*scene.markers, other)))
+    whole = fm.simulate(system, 20.0, samples=50).markers
+    monkeypatch.setattr(trajectory, "ROTATIONS", 60)  # one marker at a time
+    parts = fm.simulate(system, 20.0, samples=50).markers
+    assert len(whole) > 1 and list(whole) == list(parts)
+    for name, path in whole.items():
+        assert np.array_equal(path.quaternion, parts[name].quaternion)
+        turned = np.sum(path.quaternion[1:] * path.quaternion[:-1], axis=1)
+        assert turned.min() > 0.0 > path.quaternion[:, 0].min()  # a control: signs that are positive would jump
+        assert trajectory._marker_paths([name], np.zeros((0, 1, 24)))[name].quaternion.shape == (0, 4)
+
+
+@pytest.mark.parametrize(("start", "end", "number"), [(0.0, 10.0, 201), (-3.1, 7.7e3, 1000), (0.1, 0.3, 7)])
+def test_equal_samples_are_those_of_numpy(start: float, end: float, number: int) -> None:
+    assert np.array_equal(sample_times(number, end, start), np.linspace(start, end, number))
