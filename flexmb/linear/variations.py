@@ -80,7 +80,7 @@ class Variations(NamedTuple):
         return found
 
 
-class StateNames(NamedTuple):
+class ModelStates(NamedTuple):
     """Names and units of the states of a linear model, and of the dependent displacements and speeds, which are at
     these places among all."""
 
@@ -131,14 +131,14 @@ class Equations:
         self._as_system = same_structure(self.constants, system.constants)
         shared = like is not None and same_structure(self.constants, like.constants)
         self._root: Equations = like._root if like is not None and shared else self
-        self._named: tuple[bytes, StateNames] | None = None
+        self._named: tuple[bytes, ModelStates] | None = None
 
     @kept
     def labels(self) -> ModelLabels:
         """Names and units in the linear models of all equations of this structure."""
         return self._root.labels if self._root is not self else model_labels(self.system, self.constants, self.free)
 
-    def state_names(self, chosen: Index) -> StateNames:
+    def state_names(self, chosen: Index) -> ModelStates:
         """By the numbers (f,) of the independent speeds among the free ones; those of the last choice are kept."""
         root, key = self._root, chosen.tobytes()
         known = root._named  # read once: another thread may put that of another choice in its place
@@ -146,7 +146,7 @@ class Equations:
             n, names = len(root.free), (*root.labels.displacements, *root.labels.speeds)
             states = [*chosen.tolist(), *(n + chosen).tolist()]
             places = np.array(sorted(set(range(2 * n)) - set(states)), np.int64)
-            named = StateNames(tuple(names[i] for i in states), tuple(names[i] for i in places.tolist()), places)
+            named = ModelStates(tuple(names[i] for i in states), tuple(names[i] for i in places.tolist()), places)
             root._named = known = key, named
         return known[1]
 

@@ -39,7 +39,8 @@ def sample_times(samples: int | Sequence[float] | Real, t_end: float, t_start: f
         if number < 2:
             raise ValueError(f"samples is {number}: ask for at least 2 output times, the start and the end")
         _refuse_samples(number, _SAMPLE_BYTES)
-        equal: Real = np.arange(float(number)) * ((t_end - t_start) / (number - 1)) + t_start  # as `linspace`, sooner
+        steps = np.arange(number, dtype=np.float64)  # as `linspace`, which takes three times as long
+        equal: Real = steps * ((t_end - t_start) / (number - 1)) + t_start
         equal[-1] = t_end
         if _increase(equal):
             return equal
