@@ -79,13 +79,6 @@ REASONS = (
         "where a body takes little (docs/kernels.md). What computes for ten seconds gets special kernels by itself.",
     ),
     Reason(
-        ("call_derivatives_chain", "call_derivatives_loop", "call_linearize_chain", "call_linearize_loop"),
-        "Python around 4 to 6 µs of kernel. Of `linearize` of the four-bar kernels take 30 µs; half are its variations "
-        "(a singular value decomposition, two triangular systems, some forty small products), a fifth examines and "
-        "closes the state, a tenth are markers, a twelfth the copies of the model. Measured with more of it, which was "
-        "taken out since: beside other work the calls took 0.5 to 0.7 of the time before.",
-    ),
-    Reason(
         ("sensitivity_1",),
         "a dual number holds seven derivatives: by one number the equations cost what they cost by seven, three times "
         "those of the motion (5.8 µs against 1.9), in as many steps (5730 against 5950: accuracy bounds both), beside "
