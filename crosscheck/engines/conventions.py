@@ -34,7 +34,11 @@ def angular_first(spatial: ArrayLike) -> Real:
 
 
 def cross(a: Real, b: Real) -> Real:
-    """a x b over the last axis (..., 3); the general `np.cross` takes twenty times as long."""
+    """a x b over the last axis (..., 3); the general `np.cross` takes twenty times as long, and two single vectors are
+    fastest in plain numbers."""
+    if a.ndim == b.ndim == 1:
+        (p, q, r), (x, y, z) = a.tolist(), b.tolist()
+        return np.array([q * z - r * y, r * x - p * z, p * y - q * x])
     return a[..., [1, 2, 0]] * b[..., [2, 0, 1]] - a[..., [2, 0, 1]] * b[..., [1, 2, 0]]
 
 

@@ -371,6 +371,8 @@ class TreeLoads:
         self.at_nodes = [
             (at.link, PointLoad(load, at.frame, signals)) for at, load in zip(places, scene.loads, strict=True)
         ]
+        numbers = sorted({link for link, _ in self.at_nodes})
+        self._by_link = [(number, [load for link, load in self.at_nodes if link == number]) for number in numbers]
         self.between, self.along_hinges = connections(scene, links), []
         for name, item, number, along in along_hinges(scene):
             own = [slot for slot in scalars(slots) if slot.link.joint == item]
@@ -393,13 +395,21 @@ class TreeLoads:
 
     def wrenches(self, t: float, motion: LinkMotion) -> tuple[dict[int, Real], float]:
         """[torque; force] (6,) on links about the origins of their frames, World axes, and the power (W)."""
-        total, power, none = dict[int, Real](), 0.0, np.zeros(3)
-        for link, load in self.at_nodes:
+        total, power = dict[int, Real](), 0.0
+        for link, loads in self._by_link:
             at = motion(link)
-            given = load.in_world(t, at.rotation)
-            wrench = np.concatenate([cross(at.rotation @ load.point, given), given] if load.is_force else [given, none])
-            total[link] = total[link] + wrench if link in total else wrench
-            power += float(wrench[:3] @ at.angular + wrench[3:] @ at.linear)
+            turn, push = np.zeros(3), np.zeros(3)
+            for load in loads:
+                given = load.in_world(t, at.rotation)
+                if load.is_force:
+                    push += given
+                    turn += cross(at.rotation @ load.point, given)
+                else:
+                    turn += given
+            total[link] = np.concatenate([turn, push])
+            power += float(turn @ at.angular + push @ at.linear)
+        if not self.between:
+            return total, power
         exerted = self.exerted(t, motion)
         for connector in self.between:
             both = exerted[connector.name]

@@ -10,8 +10,8 @@ from contextlib import contextmanager
 import mujoco
 import numpy as np
 
-from crosscheck.engines.connections import Moving
-from crosscheck.engines.conventions import cross, shift_wrench
+from crosscheck.engines.connections import WORLD, Moving
+from crosscheck.engines.conventions import cross
 from crosscheck.engines.functions_of_time import Signals, profile
 from crosscheck.engines.mujoco.tree import ARMATURE, COUNTING, MujocoSlot, MujocoTree
 from crosscheck.engines.rigid_tree import JointForces, TreeLoads, motors
@@ -63,11 +63,18 @@ class Forces:
             applied[index] += along.load
         if loads.on_links:
             data.xfrc_applied[:] = 0.0
-            wrenches, _ = loads.wrenches(t, lambda link: self.link_motion(link, data))
+            motion = self.link_motion if loads.between else self._place  # loads at nodes do not depend on speeds
+            wrenches, _ = loads.wrenches(t, lambda link: motion(link, data))
             for link, wrench in wrenches.items():
                 body = self._tree.bodies[link]
-                torque, force = shift_wrench(wrench, data.xpos[body] - data.xipos[body]).reshape(2, 3)
-                data.xfrc_applied[body] = np.concatenate([force, torque])
+                force = wrench[3:]
+                data.xfrc_applied[body, :3] = force
+                data.xfrc_applied[body, 3:] = wrench[:3] + cross(data.xpos[body] - data.xipos[body], force)
+
+    def _place(self, link: int, data: mujoco.MjData) -> Moving:
+        """Where the frame of a link is, as if at rest."""
+        body = self._tree.bodies[link]
+        return Moving(data.xpos[body], data.xmat[body].reshape(3, 3), WORLD.angular, WORLD.linear)
 
     def link_motion(self, link: int, data: mujoco.MjData) -> Moving:
         """How the frame of a link moves; positions and velocities of `data` are up to date."""
