@@ -19,7 +19,7 @@ from crosscheck.library.reference import Knowledge, Known, digest, scene_digest,
 from crosscheck.manufacture.doubt import answers
 from crosscheck.manufacture.drives import Manufactured
 from crosscheck.references.files import knowledge_text, write_both
-from flexmb.output.whole import write_whole
+from flexmb.output.files import write_whole
 from flexmb.run.channels import channels_of, distance, family, magnitude, signal_range
 from flexmb.scene.files import dumps
 from flexmb.scene.schema import Scene

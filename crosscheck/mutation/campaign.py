@@ -35,7 +35,7 @@ from crosscheck.running.plan import plan, recorded_reference, variant_scene
 from crosscheck.running.scheduler import BY_DEFAULT, Limits
 from crosscheck.running.sweep import Listener, run_planned
 from flexmb.kept import kept
-from flexmb.output.whole import take_away, write_whole
+from flexmb.output.files import take_away, write_whole
 from flexmb.run.channels import distance, family, magnitude
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real

@@ -10,7 +10,7 @@ import msgspec
 from crosscheck.report.html import INDEX, embedded, places, templates
 from crosscheck.report.site import FOLDER, SINGLE, asset_files, clear_site, write_pages
 from crosscheck.validation.budget import Budget, document
-from flexmb.output.whole import write_whole
+from flexmb.output.files import write_whole
 
 RESULTS = "validation.json"
 SCRIPTS = ("data.js", "charts.js", "page.js", "measured.js")

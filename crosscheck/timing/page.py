@@ -17,9 +17,8 @@ from matplotlib.figure import Figure
 
 from crosscheck.records.machine import environment
 from crosscheck.timing.chart import CaseCharts, ChartData, ChartPoint
+from flexmb.output.files import folder, save_figure, write_whole
 from flexmb.output.printable import printable
-from flexmb.output.whole import save_figure, write_whole
-from flexmb.output.writing import folder
 
 # The picture of a chart: error against time, a line for each engine and integrator, the front, floor and failures.
 

@@ -32,7 +32,7 @@ from crosscheck.verify.columns import FEWEST, Columns, TimesError, VerifyError, 
 from crosscheck.verify.evidence import Evidence
 from crosscheck.verify.outcome import CsvOutcome, Detail, outcome_json
 from crosscheck.verify.target import Target, chosen_variant, goal_of, has_stored, target_of
-from flexmb.output.csv_cells import as_text
+from flexmb.output.files import as_text
 from flexmb.run.channels import distance, family, signal_range
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real

@@ -14,7 +14,7 @@ from scipy.linalg import eig, matrix_balance
 from flexmb.kept import kept
 from flexmb.output.files import whole_file
 from flexmb.tables import arguments
-from flexmb.tables.brief import brief
+from flexmb.tables.named import brief
 from flexmb.tables.soundness import unsound
 from flexmb.tables.state import NO_QUATERNIONS, State
 from flexmb.typing import Real

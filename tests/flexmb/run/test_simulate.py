@@ -11,8 +11,7 @@ from msgspec import structs
 import flexmb as fm
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.run import plots, trajectory
-from flexmb.run.samples import sample_bytes, sample_times
-from flexmb.run.switching import timing
+from flexmb.run.times import sample_bytes, sample_times, timing
 from flexmb.tables.status import Status
 from tests.benchmarks.rivals import rigid_chain
 from tests.trees import random_scene
