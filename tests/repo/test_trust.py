@@ -26,6 +26,7 @@ PLACES = {
     "flexmb/jit/linking.py": "modules of flexmb and of what it compiles with",
     "flexmb/jit/numbered.py": "text of flexmb's own", "flexmb/jit/stored.py": "compiled kernels",
     "flexmb/run/beside.py": "flexmb's own warming up, for a scene without laws of users",
+    "crosscheck/engines/peer.py": "the library that an adapter declares",
     "crosscheck/engines/registry.py": "built-in engines, plug-ins, and what a caller in Python names, never a file",
     "crosscheck/library/code.py": "files beside a case, by crosscheck regenerate, model.py, by validate, own maps",
     "crosscheck/stability/catalogue.py": "maps of crosscheck's own",
