@@ -34,7 +34,6 @@ def check(scene: SceneFile, t_end: End = None, strict: Strict = False, no_user_c
         from flexmb.scene.loaded import called
         from flexmb.scene.problems import SceneWarning, in_short
         from flexmb.scene.strains import in_words
-        from flexmb.system.few_modes import idle
         from flexmb.system.starting import check_scene
 
         loaded = load_scene(scene)
@@ -46,6 +45,8 @@ def check(scene: SceneFile, t_end: End = None, strict: Strict = False, no_user_c
     console.print(Text.assemble(("sound", "green"), printable(f": {loaded.name} ({counts})")))
     for body in loaded.bodies:
         if isinstance(body, BeamBody) and body.level != "rigid":
+            from flexmb.system.few_modes import idle  # imported here because a scene with defects needs no compiler
+
             words = in_words(body)
             if without := ", ".join(idle(body)):
                 words += f"; none of its {body.modes.count} modes: {without}"

@@ -150,6 +150,7 @@ NOT_OF_USERS = {
     "crosscheck/report/ci.py:add_differences": "adds to a page of its own",
     "crosscheck/report/site.py": "a listing of its own pages, and scripts of the package",
     "crosscheck/library/own_files.py": "a digest", "crosscheck/running/plan.py:scene_identity": "a digest",
+    "flexmb/ready/make.py": "digests of sources and kernels, and the list of these that it has written itself",
     "crosscheck/running/worker.py:memory_limit": "the kernel's words on memory",
     "crosscheck/sampling/printed.py": "scenes of cases that are read before, with other numbers",
     "crosscheck/running/worker.py:_serve": "a log, and nothing",
