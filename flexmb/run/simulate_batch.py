@@ -118,7 +118,7 @@ def _watched(runs: BatchTrajectory, turned: Mapping[int, Sequence[TooFast]], ben
 
 
 def _leaves_out(system: System) -> bool:
-    """Whether the watch of few modes has to look."""
+    """Whether the watch of few modes has to look, which the first copy tells for all."""
     if system.is_rigid:
         return False
     from flexmb.system.few_modes import suspects  # imported here because many scenes have no flexible bodies

@@ -26,27 +26,28 @@ from flexmb.typing import Real
 STRETCH, TURN = 1e-3, 3e-3
 """Part of the length by which a load may stretch a beam, and angle (rad) by which it may turn a section, before
 something is said: as for stretch that is held, and as for polynomials that are left out."""
+LOOKED_AT = 50
+"""States in which directions of loads in World axes are looked at."""
 _MOVES: dict[Family, tuple[int, ...]] = {"axial": (0,), "torsion": (3,), "bending_y": (1, 5), "bending_z": (2, 4)}
 """Components of (displacement, rotation) of a section by family."""
 
 
 class LeftOut(NamedTuple):
-    """At t (s) a `load` would move a section of a beam by `size`, a part of the length or an angle in rad, in a family
-    of which none of the beam's `given` modes is."""
+    """A `load` would move a section of a beam by up to `size`, a part of the length or an angle in rad, in a family of
+    which none of the beam's `given` modes is."""
 
     body: str
     given: int
     family: Family
     load: str
-    t: float
     size: float
 
     @property
     def what(self) -> str:
-        moved = f"would move its node there by {self.size:.2g} {'of its length' if self.family == 'axial' else 'rad'}"
+        unit = "of its length" if self.family == "axial" else "rad"
         return (
-            f'beam "{self.body}" has {self.given} modes, none of {self.family}, and at t = {self.t:g} s its load '
-            f'"{self.load}" {moved}'
+            f'beam "{self.body}" has {self.given} modes, none of {self.family}, in which its load "{self.load}" would '
+            f"move its node by up to {self.size:.2g} {unit}"
         )
 
     @property
@@ -93,44 +94,50 @@ def _idle(system: System, body: BeamBody) -> tuple[Family, ...]:
 def _moved(
     system: System, body: BeamBody, without: tuple[Family, ...], load: Load, states: tuple[Real, Real, Real]
 ) -> LeftOut | None:
-    """The family that the load would move most when it is largest; None where that is little."""
-    t, q, u = states
-    size = np.array([_largest(load.function, float(time)) for time in t])
-    n, node = int(np.argmax(size)), flexible_model(body).nodes[load.node]
-    direction = np.asarray(load.direction)
-    if load.frame == "world":
-        system.turns(float(t[n]), q[n], u[n])  # for the poses in the workspace
-        direction = body_pose(system, system.own_workspace, system.body_names.index(body.name)).rotation.T @ direction
-    else:
-        direction = node.rotation @ direction
-    wrench = np.zeros(6)
-    wrench[0 if load.type == "force" else 3 :][:3] = size[n] * direction
+    """The family that the load would move most, when it is largest and as it points in any of the states; None where
+    that is little."""
+    node = flexible_model(body).nodes[load.node]
+    directions = _directions(system, body, load, states) if load.frame == "world" else [node.rotation @ load.direction]
+    if not directions:
+        return None
+    most = max(_largest(load.function, float(time)) for time in states[0])
+    unit = np.eye(6)[:, :3] if load.type == "force" else np.eye(6)[:, 3:]
+    wrenches = most * unit @ np.transpose(directions)
     shares = {}
     for family in without:
-        motion = np.abs(_answer(body, family, float(node.position[0]), wrench))
+        motion = np.max(np.abs(_answer(body, family, float(node.position[0]), wrenches)), axis=1)
         shares[family] = motion[0] / body.length_m / STRETCH if family == "axial" else np.max(motion[3:]) / TURN
     worst = max(shares, key=lambda family: float(shares[family]))
     if not shares[worst] > 1.0:
         return None
-    return LeftOut(
-        body.name, flexible_model(body).mode_count, worst, load.name, float(t[n]),
-        float(shares[worst]) * (STRETCH if worst == "axial" else TURN),
-    )  # fmt: skip
+    size = float(shares[worst]) * (STRETCH if worst == "axial" else TURN)
+    return LeftOut(body.name, flexible_model(body).mode_count, worst, load.name, size)
 
 
-def _answer(body: BeamBody, family: Family, x: float, wrench: Real) -> Real:
-    """(6,) Displacement and rotation of the section at x (m) of the beam, clamped at its root, under a force and moment
-    there, in one family."""
+def _directions(system: System, body: BeamBody, load: Load, states: tuple[Real, Real, Real]) -> list[Real]:
+    """A load's direction in World axes seen from the body, in LOOKED_AT states at most; none of these is NaN."""
+    t, q, u = states
+    directions, k = [], system.body_names.index(body.name)
+    sound = np.flatnonzero(np.isfinite(q).all(axis=1) & np.isfinite(u).all(axis=1))
+    for n in sound[np.unique(np.linspace(0, len(sound) - 1, min(LOOKED_AT, len(sound))).astype(int))]:
+        system.turns(float(t[n]), q[n], u[n])  # for the poses in the workspace
+        directions.append(body_pose(system, system.own_workspace, k).rotation.T @ load.direction)
+    return directions
+
+
+def _answer(body: BeamBody, family: Family, x: float, wrenches: Real) -> Real:
+    """(6,n) Displacements and rotations of the section at x (m) of the beam, clamped at its root, in one family, under
+    forces and moments (6,n) there."""
     elements = beam_elements(body)
     free = np.arange(elements.size)[elements.coordinates(family)]
     free = free[~np.isin(free, elements.clamped_coordinates())]
     shapes = elements.motion(np.array([x]), np.eye(elements.size))[0][:, free]
-    answer: Real = shapes @ solve_definite(elements.stiffness()[np.ix_(free, free)], shapes.T @ wrench)
+    answer: Real = shapes @ solve_definite(elements.stiffness()[np.ix_(free, free)], shapes.T @ wrenches)
     return answer
 
 
 def _largest(function: Function, t: float) -> float:
-    """The largest size of a function of time, of one that grows without bound that at t (s)."""
+    """The largest size of a function at any time, of one that grows without bound that at t (s)."""
     match function:
         case Constant(value=value) | Pulse(value=value):
             return abs(value)
