@@ -39,7 +39,10 @@ class TreeEngine(PeerEngine):
         takes, words = self.capabilities, self.library.words
         if takes.loops and scene.closures:
             yield f'closure "{scene.closures[0].name}": {words} {takes.loops}'
-        yield obstacle(scene, words, *takes[:-1])
+        yield obstacle(
+            scene, words, takes.closed_by, takes.connected_by,
+            screws=takes.screws, couplings=takes.couplings, armatures=takes.armatures,
+        )  # fmt: skip
         if "events" in self.takes:
             yield refusal(scene)
         yield from self.own_refusals(scene)
