@@ -1,36 +1,34 @@
-"""The linear model of a scene with continuous controllers: their states follow those of the motion.
+"""The motion under continuous controllers at one state: its derivatives, in which the forces of controllers change too.
 
-Let y = C z + D v + E f be the sensor signals, with the motion z, the drives v and other forces f, and let the laws be
+Let z be the state of the motion, forces along it, and time, x the states of the controllers, y the signals of sensors
+and v what the controllers drive. With v held, everything observable has exact derivatives by z, and those by v are
+exact up to rounding, because the motion is linear in v. The laws v = g(y, x, t) and x' = l(y, x, t) close the loop:
 
-    v = G y + G_x x,    x' = L y + L_x x
+    dv = g_y y_z dz + g_x dx + g_t dt    dy = y_z dz + y_v dv    dx' = l_y dy + l_x dx + l_t dt
 
-G does not depend on loads and accelerations (scenes with such algebraic loops are refused). So G D = G E = 0, and the
-laws close the loop. C and E are exact, and D is exact up to rounding, since loads are linear in the drives. For those
-of the laws see `flexmb.control.law_derivatives`.
+g_y y_v = 0: scenes in which a force depends on itself, through a load or an acceleration, are refused.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from copy import copy
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from flexmb.control.feedback import Feedback
-from flexmb.control.law_derivatives import law_derivatives
+from flexmb.control.law_derivatives import LawDerivatives, law_derivatives
 from flexmb.control.loop import project
 from flexmb.control.loop_run import FreshStart
-from flexmb.integrate.problem import Accuracy, Clock
 from flexmb.linear.equations import equations_of
 from flexmb.linear.linear_model import LinearModel
-from flexmb.linear.observed import values
 from flexmb.linear.sensed import ChangedRow, readable, sensed
 from flexmb.linear.variations import Equations
-from flexmb.scene.functions import Constant
 from flexmb.system import algorithms
 from flexmb.system.system import System
+from flexmb.tables.arguments import finite, vector
 from flexmb.tables.state import State
 from flexmb.typing import Real
 
@@ -39,90 +37,102 @@ LARGE = 2.0**20
 REMEDY = "linearise flexmb.open_loop(scene), and close the loop on that model"
 
 
-def closed_loop(system: System, state: State, model: Callable[[Equations, State], LinearModel]) -> LinearModel:
-    """The linear model about a state and the controllers' initial states; `model` makes that of the motion alone.
+class Chained(NamedTuple):
+    """Derivatives along k directions of the motion, then by x: of the D drives (D,k+X) and of the rates of x (X,k+X);
+    by the drives: of everything observable (E,D) and of the signals (S,D)."""
 
-    NotImplementedError for sampled controllers.
-    """
-    if system.constraints:
-        state = system.admissible(state, "state")
-    loop = ClosedLoop(system, state)
-    loop_model = loop.at(state, loop.initial, model)
-    return replace(
-        loop_model.of_motion,
-        states=(*loop_model.of_motion.states, *((name, "") for name in loop.state_names)),
-        A=loop_model.A, B=loop_model.B, C=loop_model.C,
-    )  # fmt: skip
-
-
-class AtState(NamedTuple):
-    """A closed loop linearised: A, B, C of 2f+X states [xi; du; dx]; rates (X,) of x; the model of the motion alone."""
-
-    A: Real
-    B: Real
-    C: Real
+    driven: Real
     rates: Real
-    of_motion: LinearModel
+    by_drive: Real
+    said: Real
 
 
 class ClosedLoop:
-    """A system with continuous controllers, which can be linearised about any state."""
+    """A system with its controllers at single states, for one thread: controllers write what they drive to the
+    functions of time of a copy of the system."""
 
-    def __init__(self, system: System, start: State) -> None:
-        _refuse(system)
-        self._plant = plant = copy(system)
-        chosen, route = algorithms.chosen("articulated"), plant.route()
-        self._feedback = feedback = Feedback(plant, chosen, route, route.tables())
-        clock = Clock(np.array([start.t, start.t + 1.0]), np.array([start.t + 1.0]))
-        y = feedback.begin(FreshStart(start), clock, Accuracy(0.0, 0.0, 0, 0), None).y
-        self.initial: Real = y[plant.nq + plant.nu : -1]
-        """(X,) initial states of the controllers."""
-        self.state_names = feedback.state_names
-        project(start.t, y, feedback.running)  # also finds the independent rows of closures
+    def __init__(self, system: System) -> None:
+        self.plant = plant = copy(system)
+        route = plant.route()
+        self.feedback = Feedback(plant, algorithms.chosen("articulated"), route, route.tables())
 
-    def at(
-        self, state: State, x: Real, model: Callable[[Equations, State], LinearModel], one_sided: bool = False
-    ) -> AtState:
-        """The linearisation about a state of the motion and the states x (X,) of the controllers.
+    def entering(self, state: State) -> State:
+        """The state, checked; of a closed chain with its closures closed."""
+        self.plant.layout.entering(state)
+        return self.plant.admissible(state, "state") if self.plant.constraints else state
 
-        `NotDifferentiableError` where a law has a corner, unless `one_sided`: see `law_derivatives`.
-        """
-        plant, feedback = self._plant, self._feedback
-        laws = law_derivatives(feedback, state.t, np.concatenate([state.q, state.u, x, [0.0]]), one_sided)
-        equations = equations_of(plant)
-        of_motion = model(equations, state)
-        n, drives = len(of_motion.rates), len(feedback.driven)
-        states, sensors = len(x), laws.by_signal.shape[1]
-        G, L = laws.by_signal[:drives], laws.by_signal[drives:]
-        G_x, L_x = laws.by_state[:drives], laws.by_state[drives:]
-        rows = slice(len(of_motion.outputs) - sensors, None)  # sensors come last
-        C, E = readable(laws.by_signal, of_motion.C[rows]), readable(laws.by_signal, of_motion.D[rows])
-        moved, said = _effect(equations, state, feedback.driven)
-        pushed = np.vstack([np.zeros((n, drives)), moved[equations.variations(state).chosen]])
-        A = np.block([[of_motion.A + pushed @ G @ C, pushed @ G_x], [L @ (C + said @ G @ C), L_x + L @ said @ G_x]])
-        outputs = np.hstack([of_motion.C, np.zeros((len(of_motion.C), states))])
-        outputs[rows] += said @ np.hstack([G @ C, G_x])
-        outputs[np.isnan(of_motion.C).any(axis=1)] = np.nan  # what is undetermined is so by all states
-        return AtState(A, np.vstack([of_motion.B, L @ E]), outputs, laws.values[drives:], of_motion)
+    def initial(self, state: State, held: Mapping[str, Any]) -> Real:
+        """(X,) with which continuous controllers begin at a state, with these outputs of sampled controllers."""
+        return self.feedback.begin_at(FreshStart(state), held)[self.plant.nq + self.plant.nu : -1].copy()
+
+    def laws(self, state: State, states: Any, held: Mapping[str, Any], one_sided: bool = False) -> LawDerivatives:
+        """The laws at a state and these states of controllers (X,), None for their initial ones; the functions of time
+        have what is driven afterwards. `NotDifferentiableError` where a law has a corner, unless `one_sided`."""
+        start = self.plant.nq + self.plant.nu
+        y = self.feedback.begin_at(FreshStart(state), held)
+        if states is not None:
+            y[start:-1] = finite("states", vector("states", states, len(y) - 1 - start))
+        project(state.t, y.copy(), self.feedback.running)  # finds the independent rows of closures
+        return law_derivatives(self.feedback, state.t, y, one_sided)
+
+    def chained(self, state: State, laws: LawDerivatives, seen: Real, time: Real) -> Chained:
+        """The laws closed, from the derivatives (S,k) of the signals along k directions with drives held, in which time
+        advances by `time` (k,)."""
+        drives = len(self.feedback.driven)
+        row = self._by_drives(state, laws.values[:drives])
+        said = readable(laws.by_signal, sensed(self.plant, row))
+        along = laws.by_signal @ readable(laws.by_signal, seen) + np.outer(laws.by_time, time)
+        driven, rates = np.vsplit(np.hstack([along, laws.by_state]), [drives])
+        return Chained(driven, rates + laws.by_signal[drives:] @ said @ driven, row.change, said)
+
+    def _by_drives(self, state: State, driven: Real) -> ChangedRow:
+        """Everything observable, along changes of what controllers drive, which has the values `driven` (D,)."""
+        now, found = self._row(state), np.zeros((self.plant.observation.width, len(driven)))
+        for i, value in enumerate(driven):
+            self.feedback.put_drive(i, value + LARGE)
+            found[:, i] = (self._row(state) - now) / LARGE
+            self.feedback.put_drive(i, value)
+        return ChangedRow(now, found, np.zeros((self.plant.nq + self.plant.nu, len(driven))))
+
+    def _row(self, state: State) -> Real:
+        row = np.empty(self.plant.observation.width)
+        self.plant.observe_row(state.t, np.concatenate([state.q, state.u, [0.0]]), "articulated", row)
+        return row
 
 
-def _refuse(system: System) -> None:
+def continuous_loop(system: System) -> ClosedLoop:
+    """For linear models, and equilibria by these; NotImplementedError for sampled controllers."""
     sampled = [controller.name for controller in system.scene.controllers if controller.period_s is not None]
     if sampled:
         raise NotImplementedError(
             f'controller "{sampled[0]}" is sampled: a closed loop with instants has no linear model of this kind; '
             f"{REMEDY}"
         )
+    return ClosedLoop(system)
 
 
-def _effect(equations: Equations, state: State, driven: Sequence[int]) -> tuple[Real, Real]:
-    """Derivatives of free accelerations (n,D) and sensor signals (S,D) by each drive value; both are linear in it."""
-    held, system, now = equations.constant_functions(state.t), equations.system, values(equations, state)
-    by_drive = np.zeros((len(now), len(driven)))
-    for i, f in enumerate(driven):
-        changed = Constant(value=held[f].value + LARGE)
-        other = equations.with_functions([*held[:f], changed, *held[f + 1 :]])
-        by_drive[:, i] = (values(other, state) - now) / LARGE
-    still = np.zeros((system.nq + system.nu, len(driven)))
-    rates = by_drive[system.observation.columns["rates"][0]][equations.free]
-    return rates, sensed(system, ChangedRow(now, by_drive, still))
+def closed_model(
+    loop: ClosedLoop, state: State, x: Real | None, of_motion: Callable[[Equations, State], LinearModel],
+    one_sided: bool = False,
+) -> tuple[LinearModel, Real]:  # fmt: skip
+    """The linear model about a state and x (X,), None for the initial ones, and the rates (X,) of x there; its states
+    are those of the motion, then x. `of_motion` makes the model of the motion alone.
+
+    `NotDifferentiableError` where a law has a corner, unless `one_sided`: see `law_derivatives`.
+    """
+    laws, equations = loop.laws(state, x, {}, one_sided), equations_of(loop.plant)
+    model = of_motion(equations, state)
+    n, k, inputs, more = len(model.rates), len(model.A), len(model.inputs), laws.by_state.shape[1]
+    signals = slice(len(model.C) - laws.by_signal.shape[1], None)  # sensors come last
+    found = loop.chained(state, laws, np.hstack([model.C, model.D])[signals], np.zeros(k + inputs))
+    driven, of_x = (np.delete(of, np.s_[k : k + inputs], axis=1) for of in (found.driven, found.rates))
+    A, C = (np.pad(of, [(0, 0), (0, more)]) for of in (model.A, model.C))
+    rates = found.by_drive[loop.plant.observation.columns["rates"][0]]
+    A[n:] += rates[equations.free[equations.variations(state).chosen]] @ driven
+    C[signals] += found.said @ driven
+    C[np.isnan(model.C).any(axis=1)] = np.nan  # what is undetermined is so by all states
+    whole = replace(
+        model, states=(*model.states, *((name, "") for name in loop.feedback.state_names)),
+        A=np.vstack([A, of_x]), B=np.vstack([model.B, found.rates[:, k : k + inputs]]), C=C,
+    )  # fmt: skip
+    return whole, laws.values[len(found.driven) :]

@@ -42,19 +42,19 @@ class _Place(NamedTuple):
 def resting(system: System, guess: State) -> State:
     """The state near the guess, its speeds zero, in which the closed loop rests.
 
-    EquilibriumError where none is found, NotImplementedError for controllers that `ClosedLoop` refuses, ValueError or
-    TypeError for a guess that is not a state of this system or leaves closures open.
+    EquilibriumError where none is found, NotImplementedError for sampled controllers, ValueError or TypeError for a
+    guess that is not a state of this system or leaves closures open.
     """
-    from flexmb.linear.closed_loop import ClosedLoop  # imported only for scenes with controllers
+    from flexmb.linear.closed_loop import continuous_loop  # imported only for scenes with controllers
 
     t, y = system.layout.entering(guess)
     start = replace(guess, u=np.zeros_like(guess.u))
     if system.constraints:
         start = system.admissible(start)
     equations = equations_of(system).held(t)
-    loop = ClosedLoop(system, start)
+    loop = continuous_loop(system)
     try:
-        here = _look(loop, equations.on_functions(start), loop.initial)
+        here = _look(loop, equations.on_functions(start), loop.initial(start, {}))
         for _ in range(STEPS):
             inverse = np.asarray(np.linalg.pinv(here.derivative, RANK), float)
             step = -inverse @ here.left
@@ -70,10 +70,12 @@ _CLOSER = "give a guess closer to it, or a setpoint that the drives can hold"
 
 
 def _look(loop: ClosedLoop, state: State, x: Real) -> _Place:
-    look = loop.at(state, x, held_model, one_sided=True)  # Newton's method needs a slope, of either side
-    n = len(look.of_motion.rates)
-    rows, columns = slice(n, None), np.r_[:n, 2 * n : len(look.A)]
-    return _Place(state, x, np.r_[look.of_motion.rates, look.rates], look.A[rows][:, columns])
+    from flexmb.linear.closed_loop import closed_model
+
+    model, rates = closed_model(loop, state, x, held_model, one_sided=True)  # Newton's method needs either slope
+    n = len(model.rates)
+    rows, columns = slice(n, None), np.r_[:n, 2 * n : len(model.A)]
+    return _Place(state, x, np.r_[model.rates, rates], model.A[rows][:, columns])
 
 
 def _damped(loop: ClosedLoop, equations: Equations, here: _Place, inverse: Real, step: Real) -> _Place:

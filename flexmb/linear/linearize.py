@@ -33,10 +33,10 @@ def linearize(system: System | Scene, state: State | None = None, *, held: bool 
     if isinstance(system, Scene) and system.controllers:
         system = built(system)
     if isinstance(system, System) and system.scene.controllers:
-        from flexmb.linear.closed_loop import closed_loop  # imported only for scenes with controllers
+        from flexmb.linear.closed_loop import closed_model, continuous_loop  # imported only for scenes with controllers
 
-        state = system.initial_state if state is None else state
-        system.layout.entering(state)
+        loop = continuous_loop(system)
+        state = loop.entering(system.initial_state if state is None else state)
         seen = list[tuple[Equations, State]]()
 
         def of_motion(equations: Equations, at: State) -> LinearModel:
@@ -44,7 +44,7 @@ def linearize(system: System | Scene, state: State | None = None, *, held: bool 
             seen.append((equations, equations.on_functions(at)))
             return linear_model(*seen[-1])
 
-        model = closed_loop(system, state, of_motion)
+        model, _ = closed_model(loop, state, None, of_motion)
         warn(looked_at(seen))
         return model
     equations, state = entering(system, state)

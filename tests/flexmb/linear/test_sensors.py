@@ -151,8 +151,8 @@ def test_the_loop_is_that_of_the_open_model_closed_by_hand(make: Any, hinge: str
     law = fm.StateSpace(name="law", inputs=(f"load {hinge}[3]",), A=((-2.0,),), B=((1.0,),), C=((-3.0,),))
     scene = make()
     driven = scene.with_values({f"{hinge}.rotation.torque_Nm": fm.ControlSignal(source="law")})
-    found = fm.linearize(msgspec.structs.replace(driven, controllers=(law,)))
-    model = fm.linearize(scene)
+    loop = fm.compile(msgspec.structs.replace(driven, controllers=(law,)))
+    found, model = fm.linearize(loop), fm.linearize(scene)
     j = [name for name, _ in model.inputs].index(f"{hinge}.rotation")
     y = [name for name, _ in model.outputs].index(f"load {hinge}[3]")
     b, c, d = model.B[:, [j]], model.C[[y]], model.D[y, j]
@@ -160,6 +160,8 @@ def test_the_loop_is_that_of_the_open_model_closed_by_hand(make: Any, hinge: str
     assert np.max(np.abs(found.A - A)) <= 1e-9 * np.max(np.abs(A))
     assert np.max(np.abs(found.B - np.vstack([model.B, model.D[[y]]]))) <= 1e-9 * np.max(np.abs(model.B))
     assert np.max(np.abs(found.C[y] - np.r_[c[0], -3.0 * d])) <= 1e-9 * np.max(np.abs(c)) and abs(d) > 1e-3
+    pushed = fm.ControlledMotion(loop).acceleration_derivatives(loop.initial_state).of_rates.by_force
+    assert pushed[0, loop.speed(hinge)] == pytest.approx([d], rel=1e-9)
 
 
 def test_markers_at_one_place_have_no_distance_to_differentiate() -> None:
