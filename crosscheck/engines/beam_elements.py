@@ -25,17 +25,6 @@ def element_ends(body: BeamBody) -> Real:
     return np.concatenate([*parts, [L]])
 
 
-def between_stations(body: BeamBody, matrices: list[Real], x: Real) -> Real:
-    """Matrices (n,6,6) at x (n,), linear between those of the stations."""
-    at = [station.x_m for station in body.stations]
-    stacked = np.array(matrices)
-    interpolated = np.empty((len(x), 6, 6))
-    for i in range(6):
-        for j in range(6):
-            interpolated[:, i, j] = np.interp(x, at, stacked[:, i, j])
-    return interpolated
-
-
 def shears(body: BeamBody) -> bool:
     """Whether the scene's beam shears."""
     if body.level == "exact":

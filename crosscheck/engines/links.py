@@ -23,6 +23,7 @@ from flexmb.scene.bodies import ZERO
 from flexmb.scene.connectors import BetweenNodes, Connector
 from flexmb.scene.freedoms import Ball, Floating, ScalarFreedom
 from flexmb.scene.functions import Function
+from flexmb.scene.rigid_equivalent import Inertia, combine, inertia_of, rigid_equivalent
 from flexmb.scene.schema import (
     Body,
     Closure,
@@ -35,7 +36,6 @@ from flexmb.scene.schema import (
     Wheel,
 )
 from flexmb.scene.tree import GROUND, EndFrame, coordinates, ends, ordered
-from flexmb.surrogate.lumping import Inertia, combine, inertia_of, rigid_equivalent
 from flexmb.typing import Real
 
 Kind = Literal["body", "wheel", "point mass"]

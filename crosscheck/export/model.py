@@ -26,9 +26,9 @@ from flexmb.scene.bodies import IDENTITY, ZERO, BeamBody, Body, ModalBody, Quate
 from flexmb.scene.freedoms import Ball, Floating, Freedom, ScalarFreedom
 from flexmb.scene.functions import Function
 from flexmb.scene.hinges import Hinge
+from flexmb.scene.rigid_equivalent import rigid_equivalent
 from flexmb.scene.schema import Level, PointMass, Scene, Wheel
 from flexmb.scene.tree import ordered, rest_frames
-from flexmb.surrogate.lumping import rigid_equivalent
 from flexmb.typing import Real
 
 FORMAT = "crosscheck export 1"

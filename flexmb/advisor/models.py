@@ -23,9 +23,9 @@ from flexmb.scene.check.modal import second_order
 from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.problems import Place
 from flexmb.scene.rest_curve import is_curved
+from flexmb.scene.rigid_equivalent import rigid_equivalent, vector
 from flexmb.scene.schema import AngularCoordinate, Hinge, Revolute, Scene, Universal
 from flexmb.surrogate import finite_segments, substructured
-from flexmb.surrogate.lumping import rigid_equivalent, vector
 from flexmb.typing import Real
 
 _ACROSS = 1e-6  # axes count as orthogonal if the cosine of their angle is below this

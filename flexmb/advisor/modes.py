@@ -22,10 +22,10 @@ from flexmb.scene.bodies import FAMILIES, BeamBody, Family, Level, ModalBody, Mo
 from flexmb.scene.modal_data import inertia_points, modal_arrays, node_arrays
 from flexmb.scene.pieces import AT_END, across
 from flexmb.scene.rest_curve import is_curved
+from flexmb.scene.rigid_equivalent import vector
 from flexmb.scene.schema import ModalState, Scene
 from flexmb.scene.strains import CURVATURES, SHEARED, Strain, points_of_piece, polynomials_of, strains
 from flexmb.surrogate import cut_where_loaded, substructured
-from flexmb.surrogate.lumping import vector
 from flexmb.typing import Real
 
 

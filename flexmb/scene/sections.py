@@ -12,7 +12,7 @@ so that a stiffness or an inertia K that is stated at the point is T' K T on the
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from msgspec.structs import replace
@@ -77,6 +77,16 @@ def inertia_on_axis(station: BeamStation) -> Real:
         stated[:3, 3:] = stated[3:, :3].T
         stated[3:, 3:] = given[3:, 3:]
     return _on_axis(stated, station.reference_point_m)
+
+
+def between_stations(body: BeamBody, of: Callable[[BeamStation], Real], x: Real) -> Real:
+    """Matrices (n,6,6) at x (n,) m, linear between those `of` the stations, which ascend; constant beyond them."""
+    at = [station.x_m for station in body.stations]
+    values = np.array([of(station) for station in body.stations]).reshape(len(at), -1)
+    found = np.tile(values[0], (len(x), 1))
+    for k in np.flatnonzero(np.ptp(values, axis=0)):
+        found[:, k] = np.interp(x, at, values[:, k])
+    return found.reshape(-1, 6, 6)
 
 
 def mass_per_length(station: BeamStation) -> float:

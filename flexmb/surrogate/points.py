@@ -11,9 +11,9 @@ from flexmb.modal import flexible_model
 from flexmb.modal.flexible_model import SecondOrder
 from flexmb.scene.bodies import VectorSquare
 from flexmb.scene.modal_data import inertia_points
+from flexmb.scene.rigid_equivalent import vector
 from flexmb.scene.schema import BeamBody, ModalBody, ModalNode, Scene
 from flexmb.scene.tree import rest_frames
-from flexmb.surrogate.lumping import vector
 from flexmb.typing import Real
 
 

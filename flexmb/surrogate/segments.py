@@ -10,6 +10,7 @@ import numpy as np
 
 from flexmb.scene import schema as s
 from flexmb.scene.rest_curve import is_curved
+from flexmb.scene.rigid_equivalent import beam_piece, quadrature, rigid_body, section_properties
 from flexmb.scene.sections import has_plain_sections
 from flexmb.scene.strains import strains, twist_inertia
 from flexmb.scene.tree import rest_frames
@@ -22,7 +23,6 @@ from flexmb.surrogate.chain import (
     piece_at,
     stiffness_damping,
 )
-from flexmb.surrogate.lumping import beam_piece, quadrature, rigid_body, section_properties
 
 _X: s.Vector = (1.0, 0.0, 0.0)
 # Families of motion that turn sections: axis letter, axis, stiffness of a station; in the order of the rotations.

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 from crosscheck.engines.conventions import IDENTITY_FRAME, Frame
 from crosscheck.engines.links import Floating, Link, Scalar, links, placed
+from flexmb.scene.rigid_equivalent import Inertia, combine
 from flexmb.scene.schema import Scene
-from flexmb.surrogate.lumping import Inertia, combine
 from flexmb.typing import Real
 
 HUB = -1  # where the number of a part stands for the hub

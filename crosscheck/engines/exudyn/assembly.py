@@ -22,9 +22,9 @@ from flexmb.scene.connectors import BetweenNodes
 from flexmb.scene.freedoms import Ball, Floating, ScalarFreedom
 from flexmb.scene.hinges import Free, Hinge
 from flexmb.scene.modal_data import modal_arrays
+from flexmb.scene.rigid_equivalent import Inertia, inertia_of, rigid_equivalent
 from flexmb.scene.schema import BeamBody, Body, Closure, Load, ModalBody, PointMass, Scene, Wheel
 from flexmb.scene.tree import GROUND, ends, node_frame, ordered
-from flexmb.surrogate.lumping import Inertia, inertia_of, rigid_equivalent
 from flexmb.typing import Real
 
 _, Y, Z = np.eye(3)

@@ -18,7 +18,7 @@ from crosscheck.engines.exudyn.library import load, matrix
 from crosscheck.engines.exudyn.modal import PointIntegrals, gravity_force
 from crosscheck.engines.exudyn.motion import FrameMotion
 from crosscheck.engines.exudyn.rotations import exponential, local_rate_map, turn_and_rate_map
-from flexmb.surrogate.lumping import Inertia, steiner
+from flexmb.scene.rigid_equivalent import Inertia, steiner
 from flexmb.typing import Real
 
 

@@ -13,16 +13,16 @@ from itertools import repeat
 
 import numpy as np
 
-from crosscheck.engines.beam_elements import between_stations, element_ends, shears
+from crosscheck.engines.beam_elements import element_ends, shears
 from crosscheck.engines.conventions import rotation_matrix
 from crosscheck.engines.exudyn.carriers import Carrier, Workshop
 from crosscheck.engines.exudyn.motion import FrameMotion
 from crosscheck.engines.exudyn.rotations import logarithm
 from flexmb.scene.rest_curve import rest_sections
+from flexmb.scene.rigid_equivalent import Inertia, combine
 from flexmb.scene.schema import BeamBody
-from flexmb.scene.sections import inertia_on_axis, mass_centres, stiffness_on_axis
+from flexmb.scene.sections import between_stations, inertia_on_axis, mass_centres, stiffness_on_axis
 from flexmb.scene.tree import nodes_along, rest_frames
-from flexmb.surrogate.lumping import Inertia, combine
 from flexmb.typing import Real
 
 
@@ -89,7 +89,7 @@ def _add(shop: Workshop, element: BeamElement) -> None:
 def _stiffness(body: BeamBody, x: Real) -> Real:
     """Diagonals (n,6) of the stiffness. A beam without shear yields to shear as little as to stretch: stiffer springs
     would stop Newton's method at steps that follow the bending."""
-    stiffness = between_stations(body, [*map(stiffness_on_axis, body.stations)], x)
+    stiffness = between_stations(body, stiffness_on_axis, x)
     diagonals = np.array([np.diag(each) for each in stiffness])
     if not shears(body):
         diagonals[:, 1:3] = diagonals[:, :1]
@@ -99,7 +99,7 @@ def _stiffness(body: BeamBody, x: Real) -> Real:
 def _lumps(body: BeamBody, x: Real) -> list[Inertia]:
     """The inertia of every section in its axes: half of each element beside it, and tip masses."""
     middles, lengths = (x[1:] + x[:-1]) / 2.0, np.diff(x)
-    per_length = between_stations(body, [*map(inertia_on_axis, body.stations)], middles)
+    per_length = between_stations(body, inertia_on_axis, middles)
     mass, com, inertia = mass_centres(per_length)
     parts: list[list[Inertia]] = [[] for _ in x]
     for k, half in enumerate(lengths / 2.0):

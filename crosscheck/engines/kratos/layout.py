@@ -12,14 +12,14 @@ from math import cos, sin
 import numpy as np
 from numpy.typing import ArrayLike
 
-from crosscheck.engines.beam_elements import between_stations, element_ends, shears
+from crosscheck.engines.beam_elements import element_ends, shears
 from crosscheck.engines.conventions import Frame, axes_with, cross, frame, rotation_matrix
 from crosscheck.engines.functions_of_time import initial
 from flexmb.scene.freedoms import ScalarFreedom
 from flexmb.scene.hinges import Hinge, Planar, Revolute, Weld
 from flexmb.scene.rest_curve import rest_sections
 from flexmb.scene.schema import BeamBody, Scene
-from flexmb.scene.sections import inertia_on_axis, stiffness_on_axis
+from flexmb.scene.sections import between_stations, inertia_on_axis, stiffness_on_axis
 from flexmb.scene.tree import node_frame, nodes_along
 from flexmb.typing import Real
 
@@ -127,8 +127,8 @@ def _axes(chords: Real, rotations: Real) -> Real:
 
 
 def _sections(beam: BeamBody, middles: Real) -> tuple[Section, ...]:
-    stiffness = between_stations(beam, [*map(stiffness_on_axis, beam.stations)], middles)
-    inertia = between_stations(beam, [*map(inertia_on_axis, beam.stations)], middles)
+    stiffness = between_stations(beam, stiffness_on_axis, middles)
+    inertia = between_stations(beam, inertia_on_axis, middles)
     sections = []
     for K, M in zip(np.diagonal(stiffness, axis1=1, axis2=2), np.diagonal(inertia, axis1=1, axis2=2), strict=True):
         EA, GAy, GAz, GJ, EIy, EIz = K.tolist()

@@ -19,8 +19,8 @@ from crosscheck.engines.connections import Moving, connections
 from crosscheck.engines.conventions import IDENTITY_FRAME, Frame, axes_with, rotation_matrix
 from crosscheck.engines.links import Attachment, Ball, Floating, Freedom, Link, Scalar, attachment, closed_frames
 from crosscheck.engines.rigid_tree import Slot, quaternion_place
+from flexmb.scene.rigid_equivalent import Inertia
 from flexmb.scene.schema import Closure, Scene
-from flexmb.surrogate.lumping import Inertia
 from flexmb.typing import Real
 
 # Else OpenSim writes a log into the working directory, and notes to the terminal.

@@ -16,8 +16,8 @@ import numpy as np
 from crosscheck.engines.conventions import IDENTITY_FRAME, Frame
 from crosscheck.engines.links import Ball, Floating, Link, Scalar, placed
 from crosscheck.export.formats.written import Written, beside_the_tree, chain_of, number
+from flexmb.scene.rigid_equivalent import Inertia, combine
 from flexmb.scene.schema import Scene
-from flexmb.surrogate.lumping import Inertia, combine
 from flexmb.typing import Real
 
 NOTHING = Inertia(0.0, np.zeros(3), np.zeros((3, 3)))

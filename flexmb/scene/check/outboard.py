@@ -11,21 +11,20 @@ from collections.abc import Iterator, Sequence
 from typing import assert_never
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from flexmb.scene.bodies import BeamBody, ModalBody, RigidBody, SidBody, Vector
+from flexmb.scene.bodies import RigidBody, SidBody
 from flexmb.scene.check.inertia import reach
 from flexmb.scene.check.profiles import start_of
 from flexmb.scene.check.walk import entries
 from flexmb.scene.columns import column
 from flexmb.scene.freedoms import Ball, Coordinate, Floating, Freedom, ScalarFreedom
 from flexmb.scene.hinges import Hinge
-from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.problems import Defect
 from flexmb.scene.quaternions import cross_matrix, rotation_by, rotation_matrix
+from flexmb.scene.rigid_equivalent import Inertia, rest_inertia
 from flexmb.scene.rounding import ROUNDING
 from flexmb.scene.schema import PointMass, Scene, Wheel
-from flexmb.scene.sections import inertia_matrices, inertia_on_axis, mass_centres
+from flexmb.scene.sections import inertia_matrices
 from flexmb.scene.tree import GROUND, NodeFrame, ordered, rest_frames
 from flexmb.typing import Real
 
@@ -37,7 +36,6 @@ LOCKED = (
     "start elsewhere, choose another sequence, or use a spherical hinge",
 )
 ANGULAR_FIRST = [3, 4, 5, 0, 1, 2]
-GAUSS = np.polynomial.legendre.leggauss(2)  # exact for a linear section times x^2
 
 
 def moved_inertia(scene: Scene) -> Iterator[Defect]:
@@ -167,58 +165,30 @@ def _spatial_inertias(scene: Scene, nodes: _Nodes) -> tuple[list[bool], Real]:
     bodies = [scene.bodies[i] for i in rigid]
     total = np.zeros((len(scene.bodies), 6, 6))
     total[rigid] = _lumps(column(bodies, "mass_kg"), column(bodies, "com_m", 3), column(bodies, "inertia_kg_m2", 3, 3))
-    known = [True] * len(scene.bodies)
+    known = [not isinstance(body, SidBody) for body in scene.bodies]
     for i, body in enumerate(scene.bodies):
-        match body:
-            case RigidBody():
-                pass  # done above, for all at once
-            case BeamBody():
-                total[i] = _beam(body)
-            case ModalBody():
-                a = modal_arrays(body)
-                total[i] = np.sum(_lumps(a.mass, a.position + a.com_offset, a.inertia), axis=0)
-            case SidBody():
-                known[i] = False
-            case _:
-                assert_never(body)
+        if known[i] and not isinstance(body, RigidBody):  # rigid ones are done above, all at once
+            total[i] = _lump(rest_inertia(body))
     items: tuple[Wheel | PointMass, ...] = (*scene.wheels, *scene.point_masses)
     for item in items:
         i = nodes.number[item.body]
         if known[i]:
             R, p = _beside(nodes.frame(item.body, item.node), np.eye(3), np.array(item.offset_m, float))
-            X = _motions(R[None], p[None])[0]
-            total[i] += X.T @ _attached(item) @ X
+            total[i] += _lump(Inertia(item.mass_kg, p, R @ _resisting(item) @ R.T))
     return known, total
 
 
-def _attached(item: Wheel | PointMass) -> Real:
-    """Spatial inertia (6,6) of a wheel or point mass; a wheel that spins freely resists no rotation about its axis."""
+def _resisting(item: Wheel | PointMass) -> Real:
+    """Inertia (3,3) of a wheel or point mass in its node; a wheel that spins freely resists no turn about its axis."""
     match item:
         case PointMass():
-            inertia = np.zeros((3, 3))
+            return np.zeros((3, 3))
         case Wheel():
             along = np.outer(item.axis, item.axis)
-            inertia = item.transverse_inertia_kg_m2 * (np.eye(3) - along)
-            if item.prescribed_rad is not None:
-                inertia = inertia + item.axial_inertia_kg_m2 * along
+            axial = 0.0 if item.prescribed_rad is None else item.axial_inertia_kg_m2
+            return item.transverse_inertia_kg_m2 * (np.eye(3) - along) + axial * along
         case _:
             assert_never(item)
-    return _lump(item.mass_kg, np.zeros(3), inertia)
-
-
-def _beam(body: BeamBody) -> Real:
-    lumps = (_lump(t.mass_kg, np.add((t.x_m, 0.0, 0.0), t.com_m), t.inertia_kg_m2) for t in body.tip_masses)
-    total: Real = sum(lumps, np.zeros((6, 6)))
-    for left, right in zip(body.stations, body.stations[1:], strict=False):
-        half = (right.x_m - left.x_m) / 2.0
-        share = ((1.0 + np.array(GAUSS[0])) / 2.0)[:, None, None]
-        weight = half * np.array(GAUSS[1])[:, None, None]
-        between = (1.0 - share) * inertia_on_axis(left) + share * inertia_on_axis(right)
-        mass, com, inertia = mass_centres(weight * between)
-        com[:, 0] = left.x_m + half * (1.0 + np.array(GAUSS[0]))
-        turning = np.zeros_like(inertia) if body.points == "line" else inertia
-        total = total + np.sum(_lumps(mass, com, turning), axis=0)
-    return total
 
 
 def _lumps(mass: Real, com: Real, inertia: Real) -> Real:
@@ -226,9 +196,9 @@ def _lumps(mass: Real, com: Real, inertia: Real) -> Real:
     return inertia_matrices(mass, com, inertia)[:, ANGULAR_FIRST][:, :, ANGULAR_FIRST]
 
 
-def _lump(mass: float, com: Vector | Real, inertia: ArrayLike) -> Real:
+def _lump(of: Inertia) -> Real:
     """Spatial inertia (6,6) of one lump."""
-    lump: Real = _lumps(np.array([mass]), np.array([com], float), np.array([inertia], float))[0]
+    lump: Real = _lumps(np.array([of.mass]), of.com[None], of.inertia[None])[0]
     return lump
 
 

@@ -110,6 +110,22 @@ def test_a_freely_spinning_wheel_is_no_inertia_about_its_axis():
         body().scene()
 
 
+def test_a_curved_axis_is_inertia_about_its_root():
+    """Masses on the axis have none about a straight one, and all of it about one that bends away."""
+    ends = [station(0.0, 1e7, 1e3, 1.0), station(3.0, 1e7, 1e3, 1.0)]
+
+    def twisted(curvature):
+        curved = [msgspec.structs.replace(end, curvature_1_m=(0.0, 0.0, curvature)) for end in ends]
+        beam = SceneBuilder("hook").beam(
+            "hook", length=3.0, elements=8, section=curved, modes=2, level="exact", points="line"
+        )
+        return beam.revolute("twist", "ground", "hook", axis=(1, 0, 0))
+
+    twisted(0.5).scene()
+    with pytest.raises(SceneError, match="no inertia about"):
+        twisted(0.0).scene()
+
+
 def test_a_gimbal_away_from_its_lock():
     (
         SceneBuilder("top").rigid_body("top", mass=1.0, inertia=BALL)

@@ -13,11 +13,11 @@ from flexmb.modal import flexible_model
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.check import check_scene
 from flexmb.scene.functions import Constant
+from flexmb.scene.rigid_equivalent import beam_piece, combine
 from flexmb.scene.schema import BeamBody, BeamNode, Modes, StrainPolynomials, TipMass, Weld
 from flexmb.scene.strains import polynomials
 from flexmb.scene.tree import ordered
 from flexmb.surrogate import modal_points, substructured
-from flexmb.surrogate.lumping import beam_piece, combine
 from flexmb.system.compile import compile
 from tests.flexmb.surrogate.beams import FIRST_ROOT, LENGTH, LUMP, SECTION, beam_scene, cantilever, rest_positions
 

@@ -10,6 +10,7 @@ from flexmb.modal import flexible_model
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.check import check_scene
 from flexmb.scene.functions import Constant
+from flexmb.scene.rigid_equivalent import beam_piece, combine, inertia_of, rigid_equivalent
 from flexmb.scene.schema import (
     BeamBody,
     Closure,
@@ -20,9 +21,9 @@ from flexmb.scene.schema import (
     StrainPolynomials,
     TipMass,
 )
+from flexmb.scene.sections import restated
 from flexmb.scene.tree import ordered
 from flexmb.surrogate import finite_segments, modal_points, rigidify
-from flexmb.surrogate.lumping import beam_piece, combine, inertia_of, rigid_equivalent
 from tests.flexmb.surrogate.beams import FIRST_ROOT, LENGTH, LUMP, SECTION, beam_scene, cantilever, rest_positions
 
 
@@ -71,8 +72,11 @@ def test_segments_carry_the_inertia_of_the_beam(points):
 
 @pytest.mark.parametrize("points", ["line", "rotary", "section"])
 @pytest.mark.parametrize("mass", ["consistent", "lumped"])
-def test_rigid_equivalent_has_the_inertia_of_the_modal_points(points, mass):
-    taper = [SECTION, replace(SECTION, x_m=LENGTH, mass_per_length_kg_m=0.3, rotary_y_kg_m=3e-5)]
+@pytest.mark.parametrize("aside", [(0.0, 0.0), (0.02, -0.03)], ids=["on axis", "aside"])
+def test_rigid_equivalent_has_the_inertia_of_the_modal_points(points, mass, aside):
+    ends = SECTION, replace(SECTION, x_m=LENGTH, mass_per_length_kg_m=0.3, rotary_y_kg_m=3e-5)
+    numbers = {"mass_per_length_kg_m": None, "rotary_y_kg_m": 0.0, "rotary_z_kg_m": 0.0}
+    taper = [replace(end, inertia=restated(end, aside).inertia, **numbers) if any(aside) else end for end in ends]
     lump = TipMass(x_m=1.5, mass_kg=0.3, com_m=(0.1, 0.0, 0.02), inertia_kg_m2=LUMP)
     beam = beam_scene(section=taper, points=points, mass=mass, tip_masses=[lump]).bodies[0]
     own, model = inertia_of(rigid_equivalent(beam)), flexible_model(beam)

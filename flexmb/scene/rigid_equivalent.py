@@ -1,4 +1,4 @@
-"""The rigid body with the same inertia points and the same nodes at rest as a flexible body.
+"""The inertia of a body at rest, and the rigid body with the same inertia points and nodes as a flexible body.
 
 It is independent of the native modal preprocessing, and repeats only its documented choice of inertia points.
 """
@@ -12,10 +12,11 @@ from typing import assert_never
 import numpy as np
 from msgspec.structs import replace
 
+from flexmb.scene.collocation import gauss_rule
 from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.rest_curve import is_curved, rest_sections
 from flexmb.scene.schema import BeamBody, Body, ModalBody, Node, RigidBody, Scene, SidBody, TipMass, Vector
-from flexmb.scene.sections import inertia_on_axis, mass_centres
+from flexmb.scene.sections import between_stations, inertia_on_axis, mass_centres
 from flexmb.scene.tree import rest_frames
 from flexmb.typing import Real
 
@@ -35,16 +36,24 @@ class Inertia:
 
 
 def combine(parts: Sequence[Inertia]) -> Inertia:
-    """Several rigid bodies as one, by Steiner's theorem."""
-    mass = sum(part.mass for part in parts)
-    com = sum((part.mass * part.com for part in parts), np.zeros(3)) / (mass or 1.0)
-    inertia = sum((part.inertia + steiner(part.mass, part.com - com) for part in parts), np.zeros((3, 3)))
-    return Inertia(mass, com, inertia)
+    """Several rigid bodies as one."""
+    return combined(
+        np.array([part.mass for part in parts], float), np.array([part.com for part in parts], float).reshape(-1, 3),
+        np.array([part.inertia for part in parts], float).reshape(-1, 3, 3),
+    )  # fmt: skip
 
 
-def steiner(mass: float, offset: Real) -> Real:
-    """Inertia (3,3) of a point mass at `offset` (3,) about the origin."""
-    return mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
+def combined(mass: Real, com: Real, inertia: Real) -> Inertia:
+    """Bodies of masses (n,), mass centres (n,3) and inertias (n,3,3) about these as one, by Steiner's theorem."""
+    total = float(mass.sum())
+    centre: Real = mass @ com / (total or 1.0)
+    return Inertia(total, centre, np.sum(inertia + steiner(mass, com - centre), axis=0))
+
+
+def steiner(mass: float | Real, offset: Real) -> Real:
+    """Inertias (...,3,3) of point masses (...) at offsets (...,3) about the origin."""
+    squares = np.sum(offset**2, axis=-1)[..., None, None] * np.eye(3)
+    return np.asarray(mass)[..., None, None] * (squares - offset[..., :, None] * offset[..., None, :])
 
 
 def section_properties(body: BeamBody, x: Real, *keys: str) -> tuple[Real, ...]:
@@ -56,12 +65,7 @@ def section_properties(body: BeamBody, x: Real, *keys: str) -> tuple[Real, ...]:
 
 def _sections(body: BeamBody, x: Real) -> tuple[Real, Real, Real]:
     """Masses per length (n,), mass centres (n,3) from the axis and inertias (n,3,3) about these at x (n,)."""
-    stations = sorted(body.stations, key=lambda station: station.x_m)
-    at, values = [station.x_m for station in stations], np.array([inertia_on_axis(station) for station in stations])
-    stiffness = np.zeros((len(x), 6, 6))
-    for i, j in np.ndindex(6, 6):
-        stiffness[:, i, j] = np.interp(x, at, values[:, i, j])
-    mass, com, inertia = mass_centres(stiffness)
+    mass, com, inertia = mass_centres(between_stations(body, inertia_on_axis, x))
     return mass, com, np.zeros_like(inertia) if body.points == "line" else inertia
 
 
@@ -69,7 +73,7 @@ def quadrature(body: BeamBody, cuts: Sequence[float] | Real) -> tuple[Real, Real
     """Gauss points and weights (n,) between the cuts (ascending) and stations, where the sections have kinks."""
     inside = [station.x_m for station in body.stations if cuts[0] < station.x_m < cuts[-1]]
     ends = np.unique([*cuts, *inside])
-    s, w = np.polynomial.legendre.leggauss(_GAUSS_POINTS)
+    s, w = gauss_rule(_GAUSS_POINTS)
     half = np.diff(ends)[:, None] / 2.0
     return (ends[:-1, None] + half * (1.0 + s)).ravel(), (half * w).ravel()
 
@@ -81,12 +85,11 @@ def beam_piece(body: BeamBody, start: float, end: float) -> Inertia:
     """
     x, weight = quadrature(body, np.linspace(start, end, 1 + _CURVED_PARTS) if is_curved(body) else (start, end))
     position, rotation = rest_sections(body, x)
-    parts = [
-        Inertia(length * m, at + R @ com, length * R @ J @ R.T)
-        for at, R, length, m, com, J in zip(position, rotation, weight, *_sections(body, x), strict=True)
-    ]
+    m, com, J = _sections(body, x)
+    turned = rotation @ (weight[:, None, None] * J) @ np.swapaxes(rotation, 1, 2)
+    along = combined(weight * m, position + np.einsum("nij,nj->ni", rotation, com), turned)
     here = [lump for lump in body.tip_masses if start <= lump.x_m < end or lump.x_m == end == body.length_m]
-    return combine([*parts, *_lumps(body, here)])
+    return combine([along, *_lumps(body, here)]) if here else along
 
 
 def _lumps(body: BeamBody, lumps: Sequence[TipMass]) -> list[Inertia]:
@@ -102,31 +105,37 @@ def _lumped_beam(body: BeamBody) -> Inertia:
     nodes = np.linspace(0.0, body.length_m, body.elements + 1)
     x, weight = quadrature(body, tuple(nodes))
     hats = np.maximum(0.0, 1.0 - np.abs(x[:, None] - nodes) * body.elements / body.length_m)
-    sections = list(zip(*_sections(body, x), strict=True))
-    parts = [*_lumps(body, body.tip_masses)]
-    for node, hat in zip(nodes, (weight[:, None] * hats).T, strict=True):
-        here = zip(hat, sections, strict=True)
-        parts.append(combine([Inertia(factor * m, com + [node, 0.0, 0.0], factor * J) for factor, (m, com, J) in here]))
-    return combine(parts)
+    m, com, J = _sections(body, x)
+    share = weight[:, None] * hats
+    places = com[:, None] + np.column_stack([nodes, np.zeros((len(nodes), 2))])
+    inertias = (share[..., None, None] * J[:, None]).reshape(-1, 3, 3)
+    along = combined((share * m[:, None]).ravel(), places.reshape(-1, 3), inertias)
+    return combine([along, *_lumps(body, body.tip_masses)])
 
 
-def rigid_equivalent(body: Body) -> RigidBody:
-    """The body without its modes. A rigid body is returned unchanged; a SID body raises ValueError."""
+def rest_inertia(body: Body) -> Inertia:
+    """The inertia of a body at rest, in its own frame; ValueError for a SID body."""
     match body:
         case RigidBody():
-            return body
+            return inertia_of(body)
         case BeamBody(mass="lumped"):
-            inertia = _lumped_beam(body)
+            return _lumped_beam(body)
         case BeamBody():
-            inertia = beam_piece(body, 0.0, body.length_m)
+            return beam_piece(body, 0.0, body.length_m)
         case ModalBody():
             arrays = modal_arrays(body)
-            parts = zip(arrays.mass, arrays.position + arrays.com_offset, arrays.inertia, strict=True)
-            inertia = combine([Inertia(*part) for part in parts])
+            return combined(arrays.mass, arrays.position + arrays.com_offset, arrays.inertia)
         case SidBody():
             raise ValueError(f'the mass of body "{body.name}" is in its SID file: convert it by flexmb import')
         case _:
             assert_never(body)
+
+
+def rigid_equivalent(body: Body) -> RigidBody:
+    """The body without its modes. A rigid body is returned unchanged; a SID body raises ValueError."""
+    if isinstance(body, RigidBody):
+        return body
+    inertia = rest_inertia(body)
     frames = {name: frame for name, frame in rest_frames(body).items() if name != "origin"}
     nodes = tuple(Node(name=name, position_m=at.position, quaternion=at.quaternion) for name, at in frames.items())
     return rigid_body(body.name, inertia, nodes)
