@@ -15,6 +15,7 @@ import matplotlib.pyplot as plt
 from crosscheck.judging.results import CaseResults, collect
 from crosscheck.library.case import Chart
 from crosscheck.records.archive import read
+from crosscheck.report.speed import fastest
 from crosscheck.report.workprecision import WorkPrecision, work_precision
 from tests.repo.project import ROOT
 
@@ -86,11 +87,9 @@ def tabulate(results: CaseResults, charts: list[WorkPrecision]) -> None:
     print(results.case.run.title)
     for chart in charts:
         for error in ERRORS:
-            fastest = {
-                STYLES[engine][0]: min((1e3 * wall for e, wall in points if e <= error), default=None)
-                for engine, points in runs(chart).items()
-            }
-            row = ", ".join(f"{name} {'-' if ms is None else format(ms, '.3g')}" for name, ms in fastest.items())
+            found = fastest(chart, error / chart.scale)
+            times = {engine: f"{1e3 * found[engine]:.3g}" if engine in found else "-" for engine in runs(chart)}
+            row = ", ".join(f"{STYLES[engine][0]} {ms}" for engine, ms in times.items())
             print(f"  {chart.title}, {error:.0e} m: {row} ms")
 
 

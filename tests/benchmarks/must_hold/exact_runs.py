@@ -22,7 +22,7 @@ from flexmb.surrogate import substructured
 from tests.benchmarks import exact_scenes as scenes
 from tests.benchmarks.exudyn_runs import Newton, sections, solved
 from tests.benchmarks.must_hold.row import Measured, Row
-from tests.benchmarks.must_hold.tuning import Setting, equal_error
+from tests.benchmarks.must_hold.tuning import Setting, equal_error, up_to
 from tests.cases.test_spinning_beam import TRUTHS, minimum, rotating_frame
 
 GROUP = "Beams of level exact: whole runs"
@@ -230,11 +230,9 @@ def _elements(beam: Any, times: np.ndarray, error: Callable[[np.ndarray], float]
         found = error(sections(beam, states, places)) if len(states.times) == len(times) else np.inf
         return Setting(run, f"{method}, step {1e3 * step:.3g} ms, {newton}", found)
 
+    halved = [float(times[1]) / 2.0**halvings for halvings in range(HALVINGS)]
     for method in ("GeneralizedAlpha", "TrapezoidalIndex2"):
-        for halvings in range(HALVINGS):
-            step = float(times[1]) / 2.0**halvings
-            first = setting(method, USUAL_NEWTON, step)
-            yield first
-            if first.error <= level:
-                yield from (setting(method, Newton(*newton), step) for newton in NEWTONS)
-                break
+        steps = list(up_to(level, (setting(method, USUAL_NEWTON, step) for step in halved)))
+        yield from steps
+        if steps[-1].error <= level:
+            yield from (setting(method, Newton(*newton), halved[len(steps) - 1]) for newton in NEWTONS)

@@ -23,7 +23,7 @@ from flexmb.scene.schema import Scene
 from flexmb.surrogate import rigidify
 from tests.benchmarks.exudyn_runs import SPECTRAL_RADIUS, Newton, solved
 from tests.benchmarks.must_hold.row import Measured, Row
-from tests.benchmarks.must_hold.tuning import Setting, equal_error
+from tests.benchmarks.must_hold.tuning import Setting, equal_error, up_to
 
 GROUP = "Floating frames at equal error"
 MARKER = "tip"
@@ -78,19 +78,14 @@ def _settings(case: str, seconds: int) -> tuple[list[Setting], list[Setting]]:
 
 
 def _native(system: fm.System, times: np.ndarray, exact: np.ndarray, bending: float) -> Iterator[Setting]:
+    def setting(label: str, method: Method, rtol: float, step: float | None = None) -> Setting:
+        run = partial(_simulated, system, times, method, rtol, step)
+        return Setting(run, f"{method}, {label}", _error(run(), exact, bending))
+
     for method in METHODS:
-        for rtol in TOLERANCES:
-            run = partial(_simulated, system, times, method, rtol)
-            error = _error(run(), exact, bending)
-            yield Setting(run, f"{method}, rtol {rtol:g}", error)
-            if error <= LEVELS[-1]:
-                break
-    for step in STEPS:
-        run = partial(_simulated, system, times, "generalised_alpha", NATIVE_NEWTON, step)
-        error = _error(run(), exact, bending)
-        yield Setting(run, f"generalised_alpha, step {1e3 * step:.3g} ms", error)
-        if error <= LEVELS[-1]:
-            break
+        yield from up_to(LEVELS[-1], (setting(f"rtol {rtol:g}", method, rtol) for rtol in TOLERANCES))
+    steps = (setting(f"step {1e3 * step:.3g} ms", "generalised_alpha", NATIVE_NEWTON, step) for step in STEPS)
+    yield from up_to(LEVELS[-1], steps)
 
 
 def _simulated(

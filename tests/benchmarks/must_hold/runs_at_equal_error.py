@@ -7,8 +7,9 @@ by one call for all steps, and SciPy's integrators around `pin.aba`, where most 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import cache, partial
+from itertools import starmap
 
 import numpy as np
 
@@ -16,7 +17,7 @@ import flexmb as fm
 from tests.benchmarks import peers
 from tests.benchmarks.must_hold.row import Measured, RivalsDiffer, Row
 from tests.benchmarks.must_hold.runs import BODIES, T_END, scipy_over_aba
-from tests.benchmarks.must_hold.tuning import Setting, equal_error
+from tests.benchmarks.must_hold.tuning import Setting, equal_error, up_to
 from tests.benchmarks.rivals import rigid_chain
 
 GROUP = "Whole runs at equal error, 10 bodies, 1 s"
@@ -68,23 +69,21 @@ def _run(method: fm.Method, **settings: float) -> np.ndarray:
     return np.concatenate([done.q[-1], done.u[-1]])
 
 
-def _tried(run: Callable[..., np.ndarray], labelled: Iterable[tuple[str, tuple]]) -> Iterator[Setting]:
-    """Settings in the order given, up to the first that errs by no more than the last level."""
-    for label, arguments in labelled:
+def _tried(run: Callable[..., np.ndarray], labelled: Iterable[tuple[str, tuple]]) -> list[Setting]:
+    def setting(label: str, arguments: tuple) -> Setting:
         call = partial(run, *arguments)
-        found = call()
-        error = float(np.max(np.abs(found - _exact())) / np.max(np.abs(_exact())))
-        yield Setting(call, label, error if np.isfinite(error) else np.inf)
-        if error <= LEVELS[-1]:
-            return
+        error = float(np.max(np.abs(call() - _exact())) / np.max(np.abs(_exact())))
+        return Setting(call, label, error if np.isfinite(error) else np.inf)
+
+    return list(up_to(LEVELS[-1], starmap(setting, labelled)))
 
 
 def _by_tolerance(run: Callable[[str, float], np.ndarray], method: str) -> list[Setting]:
-    return list(_tried(run, ((f"{method}, rtol {rtol:g}", (method, rtol)) for rtol in TOLERANCES)))
+    return _tried(run, ((f"{method}, rtol {rtol:g}", (method, rtol)) for rtol in TOLERANCES))
 
 
 def _by_steps(run: Callable[[int], np.ndarray], method: str) -> list[Setting]:
-    return list(_tried(run, ((f"{method}, {steps} steps", (steps,)) for steps in STEPS)))
+    return _tried(run, ((f"{method}, {steps} steps", (steps,)) for steps in STEPS))
 
 
 @cache
