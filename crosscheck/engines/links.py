@@ -23,7 +23,7 @@ from flexmb.scene.bodies import ZERO
 from flexmb.scene.connectors import BetweenNodes, Connector
 from flexmb.scene.freedoms import Ball, Floating, ScalarFreedom
 from flexmb.scene.functions import Function
-from flexmb.scene.rigid_equivalent import Inertia, combine, inertia_of, rigid_equivalent
+from flexmb.scene.rigid_equivalent import Inertia, combine, rest_inertia, wheel_inertia
 from flexmb.scene.schema import (
     Body,
     Closure,
@@ -170,7 +170,7 @@ def links(scene: Scene) -> tuple[Link, ...]:
             inboard = chain[parent].body @ inboard
         fixed, moving = _point_masses(scene, body)
         lumps = [placed(_point(point), in_link @ _place(point, body)) for point in fixed]
-        inertia = combine([placed(inertia_of(rigid_equivalent(body)), in_link), *lumps])
+        inertia = combine([placed(rest_inertia(body), in_link), *lumps])
         index[body.name] = own = len(chain)
         chain.append(Link(body.name, "body", hinge.name, parent, inboard, freedoms(hinge), inertia, in_link))
         for point in moving:
@@ -230,10 +230,7 @@ def _scalar(freedom: ScalarFreedom) -> Scalar:
 
 
 def _disc(wheel: Wheel) -> Inertia:
-    a = np.array(wheel.axis, dtype=float)
-    transverse = wheel.transverse_inertia_kg_m2
-    about_axis = (wheel.axial_inertia_kg_m2 - transverse) * np.outer(a, a)
-    return Inertia(wheel.mass_kg, np.zeros(3), transverse * np.eye(3) + about_axis)
+    return Inertia(wheel.mass_kg, np.zeros(3), wheel_inertia(wheel))
 
 
 def _point(point: PointMass) -> Inertia:

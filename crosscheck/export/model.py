@@ -26,7 +26,7 @@ from flexmb.scene.bodies import IDENTITY, ZERO, BeamBody, Body, ModalBody, Quate
 from flexmb.scene.freedoms import Ball, Floating, Freedom, ScalarFreedom
 from flexmb.scene.functions import Function
 from flexmb.scene.hinges import Hinge
-from flexmb.scene.rigid_equivalent import rigid_equivalent
+from flexmb.scene.rigid_equivalent import rigid_equivalent, wheel_inertia
 from flexmb.scene.schema import Level, PointMass, Scene, Wheel
 from flexmb.scene.tree import ordered, rest_frames
 from flexmb.typing import Real
@@ -126,10 +126,7 @@ def _rigid(
 
 
 def _wheel_body(wheel: Wheel) -> Data:
-    axis = np.array(wheel.axis, dtype=float)
-    transverse = wheel.transverse_inertia_kg_m2
-    inertia = transverse * np.eye(3) + (wheel.axial_inertia_kg_m2 - transverse) * np.outer(axis, axis)
-    return _rigid(f"wheel {wheel.name}", wheel.mass_kg, ZERO, inertia, {})
+    return _rigid(f"wheel {wheel.name}", wheel.mass_kg, ZERO, wheel_inertia(wheel), {})
 
 
 def _frame(position: Vector, quaternion: Quaternion) -> Data:

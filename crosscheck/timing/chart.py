@@ -11,6 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
+import numpy as np
+
 from crosscheck.engines.registry import PROVIDER
 from crosscheck.library.case import CaseError
 from crosscheck.library.efforts import on_front
@@ -136,14 +138,14 @@ def _point(observable: str, rival: Rival, rung: Rung, measured: Timed | None, ri
         return _without(rival, rung, f"it does not offer {observable}, or not at the reference's times")
     if not errors[observable] < inf:
         return _without(rival, rung, "its error is no number")
-    solves = sorted(sample.solve_s for sample in measured.samples)
+    solves = [sample.solve_s for sample in measured.samples]
     return ChartPoint(
         variant=rival.job.variant,
         engine=rival.job.engine,
         integrator=rung.effort.method,
         effort=rung.effort.label,
-        solve_s=solves[0],
-        quartiles_s=(_quantile(solves, 0.25), _quantile(solves, 0.75)),
+        solve_s=min(solves),
+        quartiles_s=(float(np.quantile(solves, 0.25)), float(np.quantile(solves, 0.75))),
         error=errors[observable],
     )
 
@@ -152,13 +154,6 @@ def _without(rival: Rival, rung: Rung | None, message: str) -> ChartPoint:
     """A point without error, for the margin of the chart."""
     method, label = (rung.effort.method, rung.effort.label) if rung is not None else ("", "")
     return ChartPoint(rival.job.variant, rival.job.engine, method, label, None, None, None, message)
-
-
-def _quantile(rising: Sequence[float], part: float) -> float:
-    place = part * (len(rising) - 1)
-    low = int(place)
-    high = min(low + 1, len(rising) - 1)
-    return rising[low] + (place - low) * (rising[high] - rising[low])
 
 
 def with_front(points: Sequence[ChartPoint], floor: float) -> list[ChartPoint]:

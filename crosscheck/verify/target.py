@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Protocol, assert_never
+from typing import Protocol
 
 import msgspec
 import numpy as np
@@ -26,9 +26,8 @@ from crosscheck.running.plan import jobs_at, plan, sample_times
 from crosscheck.running.scheduler import Limits, Scheduler
 from crosscheck.running.sweep import run_planned
 from crosscheck.verify.columns import VerifyError
-from flexmb.scene.bodies import BeamBody, Body, ModalBody, RigidBody, SidBody
+from flexmb.scene.rigid_equivalent import total_mass
 from flexmb.scene.schema import Scene
-from flexmb.scene.sections import mass_per_length
 from flexmb.typing import Real
 
 
@@ -77,7 +76,7 @@ class StoredTarget:
 
     @property
     def mass(self) -> float | None:
-        return total_mass(self.case.scene(self.case.run.variant(self.stored.knowledge.variant)))
+        return _mass(self.case.scene(self.case.run.variant(self.stored.knowledge.variant)))
 
     def signals(self, times: Real) -> dict[str, Signal]:
         places = shared_times(times, self.times)
@@ -108,7 +107,7 @@ class EngineTarget:
 
     @property
     def mass(self) -> float | None:
-        return total_mass(self.case.scene(self.variant))
+        return _mass(self.case.scene(self.variant))
 
     def signals(self, times: Real) -> dict[str, Signal]:
         begun = times if times[0] <= CLOCK * times[-1] else np.concatenate([[0.0], times])
@@ -177,25 +176,9 @@ def _at(signal: Signal, places: np.ndarray) -> Signal:
     return Signal(signal.values[places], kept, signal.sizes)
 
 
-def total_mass(scene: Scene) -> float | None:
-    """In kg; None if a body has its mass in a file."""
-    bodies = [_mass(body) for body in scene.bodies]
-    carried = sum(wheel.mass_kg for wheel in scene.wheels) + sum(point.mass_kg for point in scene.point_masses)
-    return None if None in bodies else carried + sum(mass for mass in bodies if mass is not None)
-
-
-def _mass(body: Body) -> float | None:
-    match body:
-        case RigidBody():
-            return body.mass_kg
-        case BeamBody():
-            stations = sorted(body.stations, key=lambda station: station.x_m)
-            places = [0.0, *(station.x_m for station in stations), body.length_m]
-            densities = [mass_per_length(station) for station in (stations[0], *stations, stations[-1])]
-            return float(np.trapezoid(densities, places)) + sum(tip.mass_kg for tip in body.tip_masses)
-        case ModalBody() if body.points:
-            return sum(point.mass_kg for point in body.points)
-        case ModalBody() | SidBody():
-            return None
-        case _:
-            assert_never(body)
+def _mass(scene: Scene) -> float | None:
+    """In kg; None if a body has its mass in a SID file."""
+    try:
+        return total_mass(scene)
+    except ValueError:
+        return None

@@ -27,6 +27,7 @@ from flexmb.interchange.mjcf_text import refuse_bad_text
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.functions import Constant
 from flexmb.scene.quaternions import rotation_matrix
+from flexmb.scene.rigid_equivalent import steiner
 from flexmb.scene.rounding import ROUNDING
 from flexmb.scene.tree import GROUND
 from flexmb.typing import Real
@@ -104,7 +105,7 @@ class _Model:
         inertia = 0.5 * (inertia + inertia.T) + extra * np.eye(3)
         builder.rigid_body(
             name, mass=own + extra, com=own * com / ((own + extra) or 1.0) if extra else com,
-            inertia=inertia + reduced * (com @ com * np.eye(3) - np.outer(com, com)),
+            inertia=inertia + steiner(reduced, com),
             nodes={"mass centre": com} if np.any(lift) else (),
         )  # fmt: skip
         self._lift(builder, f"{name}.gravcomp", name, "mass centre", lift)

@@ -15,7 +15,7 @@ from msgspec.structs import replace
 from flexmb.scene.collocation import gauss_rule
 from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.rest_curve import is_curved, rest_sections
-from flexmb.scene.schema import BeamBody, Body, ModalBody, Node, RigidBody, Scene, SidBody, TipMass, Vector
+from flexmb.scene.schema import BeamBody, Body, ModalBody, Node, RigidBody, Scene, SidBody, TipMass, Vector, Wheel
 from flexmb.scene.sections import between_stations, inertia_on_axis, mass_centres
 from flexmb.scene.tree import rest_frames
 from flexmb.typing import Real
@@ -129,6 +129,18 @@ def rest_inertia(body: Body) -> Inertia:
             raise ValueError(f'the mass of body "{body.name}" is in its SID file: convert it by flexmb import')
         case _:
             assert_never(body)
+
+
+def total_mass(scene: Scene) -> float:
+    """Of all bodies and what they carry, in kg; ValueError if one is a SID body."""
+    carried = sum(wheel.mass_kg for wheel in scene.wheels) + sum(point.mass_kg for point in scene.point_masses)
+    return carried + sum(rest_inertia(body).mass for body in scene.bodies)
+
+
+def wheel_inertia(wheel: Wheel) -> Real:
+    """Inertia (3,3) about the mass centre, in the axes of its node."""
+    along = np.outer(wheel.axis, wheel.axis)
+    return wheel.transverse_inertia_kg_m2 * (np.eye(3) - along) + wheel.axial_inertia_kg_m2 * along
 
 
 def rigid_equivalent(body: Body) -> RigidBody:

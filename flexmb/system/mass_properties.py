@@ -9,6 +9,7 @@ import numpy as np
 from flexmb.kept import kept
 from flexmb.scene.problems import closest
 from flexmb.scene.quaternions import cross_matrix
+from flexmb.scene.rigid_equivalent import combined, steiner
 from flexmb.system.frames import AT_GROUND, body_pose, link_pose
 from flexmb.system.scene_arrays import SceneArrays
 from flexmb.tables import arguments
@@ -72,13 +73,10 @@ def mass_properties(arrays: SceneArrays, w: Workspace, inertias: Real, body: str
     R, origins = np.array([pose.rotation for pose in poses]), np.array([pose.position for pose in poses])
     own = np.divide(first_moment, mass[:, None], out=np.zeros_like(first_moment), where=mass[:, None] > 0.0)
     centres = origins + np.einsum("kab,kb->ka", R, own)
-    total = float(np.sum(mass))
-    centre = mass @ centres / total if total > 0.0 else frame.position.copy()
     # Each about its own centre first: far from the World's origin, differences of squares would lose all digits.
-    own_arm, arm = cross_matrix(own), cross_matrix(centres - centre)
-    about_own = inertia + mass[:, None, None] * own_arm @ own_arm
-    turned = R @ about_own @ np.swapaxes(R, 1, 2) - mass[:, None, None] * arm @ arm
-    return MassProperties(total, centre, np.sum(turned, axis=0), frame.rotation.copy(), frame.position.copy())
+    whole = combined(mass, centres, R @ (inertia - steiner(mass, own)) @ np.swapaxes(R, 1, 2))
+    centre = whole.com if whole.mass > 0.0 else frame.position.copy()
+    return MassProperties(whole.mass, centre, whole.inertia, frame.rotation.copy(), frame.position.copy())
 
 
 def _carried(parent: list[int], first: int) -> list[int]:

@@ -41,6 +41,7 @@ from crosscheck.engines.conventions import Frame, rotation_matrix
 from crosscheck.engines.functions_of_time import initial
 from crosscheck.engines.links import Ball, Floating, Freedom, Link, Scalar, by_motion
 from crosscheck.engines.rigid_tree import Slot
+from flexmb.scene.rigid_equivalent import steiner
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -195,6 +196,6 @@ def _equip(plant: MultibodyPlant, joint: Joint, freedom: Freedom, ballasted: boo
 def _inertia(link: Link) -> SpatialInertia:
     """About the link's origin. Unchecked: a disc's moments miss the triangle inequality by round-off."""
     mass, com, about_com = link.inertia.mass, link.inertia.com, link.inertia.inertia
-    unit = about_com / mass + (com @ com) * np.eye(3) - np.outer(com, com)
+    unit = about_com / mass + steiner(1.0, com)
     moments, products = np.diag(unit), (unit[0, 1], unit[0, 2], unit[1, 2])
     return SpatialInertia(mass, com, UnitInertia(*moments, *products), skip_validity_check=True)

@@ -22,7 +22,7 @@ from flexmb.scene.connectors import BetweenNodes
 from flexmb.scene.freedoms import Ball, Floating, ScalarFreedom
 from flexmb.scene.hinges import Free, Hinge
 from flexmb.scene.modal_data import modal_arrays
-from flexmb.scene.rigid_equivalent import Inertia, inertia_of, rigid_equivalent
+from flexmb.scene.rigid_equivalent import Inertia, rest_inertia, wheel_inertia
 from flexmb.scene.schema import BeamBody, Body, Closure, Load, ModalBody, PointMass, Scene, Wheel
 from flexmb.scene.tree import GROUND, ends, node_frame, ordered
 from flexmb.typing import Real
@@ -230,7 +230,7 @@ def _place(
     if not flexible(body):
         node = frame(*node_frame(body, hinge.child_node)).inverse()
         motion = node_motion.offset(node.position, node.rotation)
-        inertia = inertia_of(rigid_equivalent(body))
+        inertia = rest_inertia(body)
         return Placed(body, shop.rigid(motion, zero, inertia), motion)
     eta, rate = _modal_state(scene, body)
     motion = node_motion.body_of(AT_REST.node(node_shape(body, hinge.child_node, np.eye(3)), eta, rate))
@@ -355,11 +355,8 @@ def _connect_along(shop: Workshop, scene: Scene, kinds: Sequence[dict[str, Exudy
 
 def _wheel(shop: Workshop, parent: Placed, wheel: Wheel) -> tuple[ExudynLink, Carrier]:
     """A wheel as a body of its own on a revolute joint; friction and motor between it and its node."""
-    axis = _unit(wheel.axis)
     port = _port(shop, parent, wheel.node, Frame(np.array(wheel.offset_m), np.eye(3)))
-    across_axis = np.eye(3) - np.outer(axis, axis)
-    tensor = wheel.axial_inertia_kg_m2 * np.outer(axis, axis) + wheel.transverse_inertia_kg_m2 * across_axis
-    inertia = Inertia(wheel.mass_kg, np.zeros(3), tensor)
+    inertia = Inertia(wheel.mass_kg, np.zeros(3), wheel_inertia(wheel))
     return joints.chain(
         shop, wheel.name, port, _steps(wheel), lambda motion: shop.rigid(motion, port.zero, inertia), np.zeros(3)
     )

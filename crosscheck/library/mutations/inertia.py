@@ -25,6 +25,7 @@ from crosscheck.library.mutations.mutation import FACTOR, Mutation, SceneChange
 from crosscheck.library.mutations.resting import rests
 from crosscheck.library.mutations.turning import EPS, only_axis
 from flexmb.scene.bodies import BeamBody, Body, Matrix3, ModalBody, RigidBody, SidBody
+from flexmb.scene.rigid_equivalent import steiner
 from flexmb.scene.schema import Scene
 
 MILLI = 1e-3
@@ -103,8 +104,7 @@ def _products(body: RigidBody) -> RigidBody:
 
 def _about_origin(body: RigidBody) -> RigidBody:
     """The parallel axes' part m (c.c 1 - c c) added once more."""
-    c = np.asarray(body.com_m)
-    return _with(body, np.asarray(body.inertia_kg_m2) + body.mass_kg * (c @ c * np.eye(3) - np.outer(c, c)))
+    return _with(body, np.asarray(body.inertia_kg_m2) + steiner(body.mass_kg, np.asarray(body.com_m)))
 
 
 def _spherical(body: RigidBody) -> RigidBody:

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import assert_never
 
 import numpy as np
 
 from crosscheck.library.channels import LINEAR_KINDS
 from crosscheck.mutation.invariances.linearised import Channels, LinearRelation
-from flexmb.scene.bodies import BeamBody, ModalBody, Quaternion, RigidBody, SidBody, Vector
+from flexmb.scene.bodies import Quaternion
+from flexmb.scene.rigid_equivalent import total_mass
 from flexmb.scene.schema import Scene
-from flexmb.scene.sections import mass_per_length
 from flexmb.typing import Real
 
 POLAR = (".position", ".velocity", ".force", ".linear")
@@ -101,30 +100,14 @@ def product(a: Real, b: Real) -> Real:
     return np.column_stack([scalar, vector])
 
 
-def vector(values: Real) -> Vector:
-    x, y, z = (float(value) for value in values)
-    return (x, y, z)
-
-
 def quaternion(values: Real) -> Quaternion:
     w, x, y, z = (float(value) for value in values)
     return (w, x, y, z)
 
 
-def total_mass(scene: Scene) -> float:
-    """The total mass (kg); `NotApplicable` if that of a body is in a file."""
-    mass = sum(wheel.mass_kg for wheel in scene.wheels) + sum(point.mass_kg for point in scene.point_masses)
-    for body in scene.bodies:
-        match body:
-            case RigidBody():
-                mass += body.mass_kg
-            case BeamBody():
-                x, density = np.array([(station.x_m, mass_per_length(station)) for station in body.stations]).T
-                mass += float(np.trapezoid(density, x)) + sum(tip.mass_kg for tip in body.tip_masses)
-            case ModalBody() if body.points:
-                mass += sum(point.mass_kg for point in body.points)
-            case ModalBody() | SidBody():
-                raise NotApplicable(f'body "{body.name}" keeps its mass in a file')
-            case _:
-                assert_never(body)
-    return mass
+def known_mass(scene: Scene) -> float:
+    """The total mass (kg); `NotApplicable` if that of a body is in its SID file."""
+    try:
+        return total_mass(scene)
+    except ValueError as error:
+        raise NotApplicable(str(error)) from None

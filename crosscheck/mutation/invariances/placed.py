@@ -14,10 +14,9 @@ from crosscheck.mutation.invariances.counterpart import (
     Invariance,
     NotApplicable,
     by_kind,
+    known_mass,
     product,
     quaternion,
-    total_mass,
-    vector,
     with_energy,
     without_feedback,
 )
@@ -26,6 +25,7 @@ from flexmb.scene.bodies import IDENTITY, Quaternion, Vector
 from flexmb.scene.connectors import BetweenNodes, Connector
 from flexmb.scene.hinges import Closure, Free, Hinge
 from flexmb.scene.quaternions import rotation_matrix
+from flexmb.scene.rigid_equivalent import vector
 from flexmb.scene.schema import Load, Scene
 from flexmb.scene.tree import GROUND
 from flexmb.typing import Real
@@ -63,7 +63,7 @@ def _turned(scene: Scene) -> Counterpart:
 def _moved(scene: Scene) -> Counterpart:
     without_feedback(scene)
     gravity = np.asarray(scene.gravity_m_s2)
-    potential = total_mass(scene) * float(gravity @ STEP_M) if np.any(gravity) else 0.0
+    potential = known_mass(scene) * float(gravity @ STEP_M) if np.any(gravity) else 0.0
 
     def placed(position: Vector, orientation: Quaternion) -> tuple[Vector, Quaternion]:
         return vector(np.asarray(position) + STEP_M), orientation
@@ -124,7 +124,7 @@ def _boosted(scene: Scene) -> Counterpart:
     held += [pair.name for pair in pairs if GROUND in (pair.body_a, pair.body_b)]
     if held:
         raise NotApplicable(f"it stands on the ground by {', '.join(held)}")
-    mass, gravity = total_mass(scene), np.asarray(scene.gravity_m_s2)
+    mass, gravity = known_mass(scene), np.asarray(scene.gravity_m_s2)
     left_out = {"momentum.angular"} | ({"work"} if any(load.type == "force" for load in scene.loads) else set())
 
     def back(times: Real, channels: Channels) -> Channels:

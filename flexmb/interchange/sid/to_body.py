@@ -32,6 +32,7 @@ from flexmb.scene.convert import plain, to_struct
 from flexmb.scene.modal_data import inertia_points
 from flexmb.scene.problems import SceneError, SceneWarning
 from flexmb.scene.quaternions import cross_matrix, quaternion_of
+from flexmb.scene.rigid_equivalent import steiner
 from flexmb.scene.rounding import ROUNDING
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
@@ -130,7 +131,7 @@ def _from_its_file(body: SidBody) -> ModalBody:
 def _repaired(sid: Sid, disagreements: list[str]) -> Sid:
     """The file with the J nearest to its own that a body of this mass and mass centre can have."""
     centre = sid.mdCM.zero[:, 0] / sid.mass
-    carried = sid.mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+    carried = steiner(sid.mass, centre)
     J = possible_inertia(sid.mass, 0.5 * (sid.J.zero + sid.J.zero.T) - carried) + carried
     changed = largest(J - sid.J.zero)
     if changed <= PRINTED * largest(sid.J.zero):

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from typing import assert_never
 
 import numpy as np
+from msgspec.structs import replace
 
 from flexmb.scene.bodies import RigidBody, SidBody
 from flexmb.scene.check.inertia import reach
@@ -21,7 +22,7 @@ from flexmb.scene.freedoms import Ball, Coordinate, Floating, Freedom, ScalarFre
 from flexmb.scene.hinges import Hinge
 from flexmb.scene.problems import Defect
 from flexmb.scene.quaternions import cross_matrix, rotation_by, rotation_matrix
-from flexmb.scene.rigid_equivalent import Inertia, rest_inertia
+from flexmb.scene.rigid_equivalent import Inertia, rest_inertia, wheel_inertia
 from flexmb.scene.rounding import ROUNDING
 from flexmb.scene.schema import PointMass, Scene, Wheel
 from flexmb.scene.sections import inertia_matrices
@@ -184,9 +185,7 @@ def _resisting(item: Wheel | PointMass) -> Real:
         case PointMass():
             return np.zeros((3, 3))
         case Wheel():
-            along = np.outer(item.axis, item.axis)
-            axial = 0.0 if item.prescribed_rad is None else item.axial_inertia_kg_m2
-            return item.transverse_inertia_kg_m2 * (np.eye(3) - along) + axial * along
+            return wheel_inertia(item if item.prescribed_rad is not None else replace(item, axial_inertia_kg_m2=0.0))
         case _:
             assert_never(item)
 

@@ -17,8 +17,8 @@ from crosscheck.verify.columns import VerifyError
 from crosscheck.verify.evidence import Evidence, turned
 from crosscheck.verify.outcome import outcome_json
 from crosscheck.verify.points import about_mass_centre, about_other_points
-from crosscheck.verify.target import total_mass
 from flexmb.scene.bodies import BeamBody, BeamStation, Modes, SidBody
+from flexmb.scene.rigid_equivalent import total_mass
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 from tests.crosscheck.sessions import here
@@ -307,4 +307,5 @@ def test_the_mass_of_a_tapered_beam_and_of_a_file() -> None:
     tapered = BeamBody(name="beam", length_m=3.0, elements=4, stations=tuple(stations), modes=Modes(count=2))
     assert total_mass(Scene(name="tapered", bodies=(tapered,), hinges=())) == pytest.approx(2.0 + 6.0, rel=1e-14)
     from_file = SidBody(name="panel", file="panel.sid")
-    assert total_mass(Scene(name="file", bodies=(tapered, from_file), hinges=())) is None
+    with pytest.raises(ValueError, match='mass of body "panel" is in its SID file'):
+        total_mass(Scene(name="file", bodies=(tapered, from_file), hinges=()))
