@@ -20,6 +20,7 @@ from flexmb.jit.pointer import MATRIX, REAL, STATUS, VECTOR, VOID
 from flexmb.kept import kept
 from flexmb.motion.coordinates import configuration_rate
 from flexmb.tables.arrays import Constants
+from flexmb.tables.features import DERIVATIVES
 from flexmb.tables.functions import any_varies
 from flexmb.tables.state import finite_result
 from flexmb.tables.status import OK
@@ -146,7 +147,8 @@ class TreeVariation:
     def __init__(self, c: Constants, w: DerivativeWorkspace, dual: TangentWorkspace, check: Check) -> None:
         self._w, self._dual, self._check, n = w, dual, check, len(c.speed)
         self.motion = CoordinateMotion(c, len(w.sweeps.q))
-        self._call = derivative_call(c, len(w.sweeps.q), n, w)
+        self._fastest = c.fastest(DERIVATIVES)  # held here: the call knows no more than where they are
+        self._call = derivative_call(self._fastest, len(w.sweeps.q), n, w)
         self._differentiate = direct(differentiate, STATUS, REAL, VECTOR, c, self._call)
         self._differentiate_by_time = direct(time_derivative, STATUS, REAL, VECTOR, VECTOR, c, dual)
         self._constants, self._varies = c, any_varies(c.function)

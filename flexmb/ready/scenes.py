@@ -15,6 +15,11 @@ def pendulum() -> SceneBuilder:
     return _bob(-9.81).revolute("pivot", "ground", "bob", stiffness=30.0)
 
 
+def turning() -> SceneBuilder:
+    """The body on a spherical hinge, which has no single axis."""
+    return _bob(-9.81).spherical("pivot", "ground", "bob")
+
+
 def panelled(modes: int, level: Level) -> SceneBuilder:
     """The pendulum with a beam, whose modes are condensed if they are many."""
     builder = pendulum().beam("panel", length=1.0, elements=8, modes=modes, level=level, section=SECTION)

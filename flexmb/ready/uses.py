@@ -72,10 +72,13 @@ def _uses() -> Iterator[tuple[str, Use]]:
     yield "derivatives by numbers, loop", partial(_numbers, scenes.looped)
     yield "laws that a scene may name", _laws
     yield "batches", partial(_batches, scenes.panelled(2, "full").scene())
-    yield "batches of rigid trees", partial(_batches, scenes.pendulum().scene())
+    yield "batches on single axes", partial(_batches, scenes.pendulum().scene())
+    yield "batches of rigid trees", partial(_batches, scenes.turning().scene())
     between = iter((
         ("single states", partial(_single_states, *BODIES[:1])),
-        ("single states of a rigid tree", _single_states_of_a_rigid_tree),
+        ("single states on single axes", partial(_single_states_of_a_rigid_tree, scenes.pendulum)),
+        ("single states of a rigid tree", partial(_single_states_of_a_rigid_tree, scenes.turning)),
+        ("derivatives on single axes", _derivatives_on_single_axes),
         ("single states, reduced bodies", _single_states_of_reduced_bodies),
         ("single states of a loop at rest shape", partial(_single_states_of_a_loop, scenes.looped_at_rest_shape)),
         ("derivatives of runs, tree", partial(_derivatives, scenes.pendulum)),
@@ -163,9 +166,9 @@ def _single_states_of_reduced_bodies() -> None:
     nested.relative_motion(0.0, y)
 
 
-def _single_states_of_a_rigid_tree() -> None:
+def _single_states_of_a_rigid_tree(builder: Callable[[], SceneBuilder]) -> None:
     """What has kernels of its own for these; the trees of runs are rigid, too."""
-    system = compile(scenes.pendulum().scene())
+    system = compile(builder().scene())
     state = system.initial_state
     system.accelerations(state)
     system.evaluate(state.t, state.q, state.u)
@@ -173,7 +176,15 @@ def _single_states_of_a_rigid_tree() -> None:
     evaluator = system.evaluator()
     evaluator(state.t, state.q, state.u)
     evaluator(state.t, state.q.tolist(), state.u.tolist())
-    _run(scenes.pendulum().scene(), "dop853")
+    _run(builder().scene(), "dop853")
+
+
+def _derivatives_on_single_axes() -> None:
+    system = compile(scenes.pendulum().scene())
+    state = system.initial_state
+    system.derivative_evaluator()(state.t, state.q, state.u)
+    system.acceleration_derivatives(state)
+    system.inverse_dynamics_derivatives(state, system.accelerations(state))
 
 
 def _single_states(*bodies: tuple[int, Level, Elimination]) -> None:

@@ -61,7 +61,7 @@ class DerivativeRoute(NamedTuple):
 
 
 def _fresh(system: Mechanics) -> tuple[Any, ...]:
-    return system.constants, derivative_call(system.constants, system.nq, system.nu)
+    return system.constants, derivative_call(system.derivative_constants, system.nq, system.nu)
 
 
 OF_TREES = DerivativeRoute("derivatives", lambda: differentiate, _fresh)

@@ -187,7 +187,7 @@ class Linearisation:
     @per_thread
     def _differentiate_inverse(self) -> Direct:
         """(t, y, rates, by_displacement, by_speed, by_acceleration)."""
-        tables = self._system.constants, self._system.own_derivatives
+        tables = self._system.derivative_constants, self._system.own_derivatives
         return direct(inverse_dynamics_derivatives, VOID, REAL, VECTOR, VECTOR, MATRIX, MATRIX, MATRIX, *tables)
 
     # Directions

@@ -19,7 +19,7 @@ from flexmb.scene.connectors import AlongHinge, HingeSpring
 from flexmb.system.observables import Names
 from flexmb.tables import arguments
 from flexmb.tables.arrays import Constants
-from flexmb.tables.features import ITS_OWN, RECURSION, WITH_EVERYTHING, Choice
+from flexmb.tables.features import DERIVATIVES, ITS_OWN, RECURSION, WITH_EVERYTHING, Choice
 from flexmb.tables.state import State
 from flexmb.tables.status import Status
 from flexmb.typing import Index, Real
@@ -101,8 +101,14 @@ class SceneArrays:
     @kept
     def explicit_constants(self) -> Constants:
         """`recursion_constants` for accelerations, outputs and runs by explicit methods, whose kernels are ready for
-        rigid trees too: they evaluate a chain of ten 1.3 times faster than general ones."""
+        rigid trees too: they evaluate a chain of ten 1.4 times faster than general ones."""
         return self.recursion_constants.fastest(RECURSION)
+
+    @kept
+    def derivative_constants(self) -> Constants:
+        """`constants` for derivatives of accelerations and of inverse dynamics, whose kernels are ready for rigid trees
+        on single axes too: 1.3 times as fast."""
+        return self.constants.fastest(DERIVATIVES)
 
     @property
     def kernels(self) -> Literal["general", "special"]:

@@ -227,7 +227,7 @@ class Constants:
         return features.features(self)
 
     def fastest(self, what: str) -> Constants:
-        """The same for the fastest kernels that are at hand for `flexmb.tables.features` RECURSION or BATCHES."""
+        """The same for the fastest kernels that are at hand for RECURSION and others of `flexmb.tables.features`."""
         kernels = features.fastest_at_hand(self, what)
         return self if kernels == self.kernels[0] else replace(self, kernels=np.array([kernels]))
 

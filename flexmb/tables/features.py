@@ -3,10 +3,10 @@
 A feature is a name for code that not all scenes need. A scene has it if any of its bodies does.
 
 General kernels contain all features and run every scene. They are compiled at installation, so that nothing needs to be
-compiled before the first run; so are those of rigid trees, which leave out modes and deforming nodes, for what is asked
-most often (`fastest_at_hand`). Special kernels contain the features of one scene; they are faster by a tenth to a third
-and take seconds to compile. The choice is made once, when the tables of a scene are first used, and recorded in
-`Constants.kernels`, so that all tables derived from them use the same kernels.
+compiled before the first run; so are smaller sets for rigid trees, for what is asked most often (`READY`). Special
+kernels contain the features of one scene; they are faster by a tenth to a third and take seconds to compile. The choice
+is made once, when the tables of a scene are first used, and recorded in `Constants.kernels`, so that all tables derived
+from them use the same kernels.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import Literal, Protocol, get_args
+from typing import Literal, NamedTuple, Protocol, get_args
 
 import numpy as np
 
@@ -29,10 +29,11 @@ _VARIABLE = "FLEXMB_KERNELS"  # environment variable with the default choice
 Choice = Kernels | Literal["beside"]
 """With "beside", a choice of general kernels, and of special ones for what the recursion alone does."""
 # `Constants.kernels`; BY_ITSELF are general ones where nobody asked for these
-UNDECIDED, EVERYTHING, BY_ITSELF, BESIDE, ITS_OWN, RIGID_TREES = range(6)
+UNDECIDED, EVERYTHING, BY_ITSELF, BESIDE, ITS_OWN, RIGID_TREES, SINGLE_AXES = range(7)
 WITH_EVERYTHING = EVERYTHING, BY_ITSELF, BESIDE
 RECURSION = "the recursion alone"  # accelerations, outputs and runs of explicit methods; in the note of what is warm
 BATCHES = "batches"  # likewise
+DERIVATIVES = "derivatives"  # of accelerations and of inverse dynamics; none of these are compiled beside
 _ASKED: ContextVar[Choice | None] = ContextVar("kernels", default=None)
 
 HINGE = "hinge"  # "hinge 1" is the kind with number 1 in flexmb.hinges.catalogue
@@ -74,7 +75,25 @@ OF_RIGID_TREES = frozenset({
     COORDINATE_LAWS, FUNCTIONS, MOTORS, PRESCRIBED, SPRINGS, BALL_SPRINGS, DAMPERS, ARMATURES, f"{LEVEL} 0",
     *(f"{name} {n}" for name in (HINGE, AXIS, FRAME_LAW, LAW) for n in _KINDS),
 })  # fmt: skip
-"""All that trees of rigid bodies may have: a second set of kernels that are compiled at installation."""
+OF_SINGLE_AXES = OF_RIGID_TREES - {
+    SEVERAL, QUATERNIONS, WHEELS, LOADS, CONNECTORS, ONE_SIDED, ACTUATORS, FRAME_LAWS, PRESCRIBED, BALL_SPRINGS,
+    f"{AXIS} -1", *(f"{FRAME_LAW} {n}" for n in _KINDS),
+}  # fmt: skip
+
+
+class Ready(NamedTuple):
+    """The features of kernels that are compiled at installation beside the general ones, and what they serve for."""
+
+    features: frozenset[str]
+    serves: tuple[str, ...]
+
+
+READY = {
+    SINGLE_AXES: Ready(OF_SINGLE_AXES, (RECURSION, BATCHES, DERIVATIVES)),
+    RIGID_TREES: Ready(OF_RIGID_TREES, (RECURSION, BATCHES)),
+}
+"""By `Constants.kernels`, the smallest first: of rigid bodies on free revolute and prismatic hinges that carry nothing,
+and of all trees of rigid bodies, whose derivatives gain too little to be worth their compilation."""
 
 
 class SceneTables(Protocol):
@@ -126,15 +145,15 @@ def as_asked() -> Index:
 
 
 def features(c: SceneTables) -> frozenset[str]:
-    """The features of the kernels for these tables: GENERAL alone, those of rigid trees, or those of the scene.
+    """The features of the kernels for these tables: GENERAL alone, those of READY, or those of the scene.
 
     Undecided tables get general kernels if these are installed and the special ones were not compiled ahead
     (`flexmb.run.warm_up`); the decision is recorded in the tables.
     """
     if c.kernels[0] in WITH_EVERYTHING:
         return frozenset({GENERAL})
-    if c.kernels[0] == RIGID_TREES:
-        return OF_RIGID_TREES
+    if c.kernels[0] in READY:
+        return READY[int(c.kernels[0])].features
     found = contained(c)
     if c.kernels[0] == UNDECIDED:
         c.kernels[0] = ITS_OWN if unfit() or is_warm(found) else BY_ITSELF
@@ -143,15 +162,16 @@ def features(c: SceneTables) -> frozenset[str]:
 
 
 def fastest_at_hand(c: SceneTables, what: str) -> int:
-    """`Constants.kernels` of tables for RECURSION or BATCHES: where others have general kernels, special ones that a
-    process beside has compiled (`flexmb.run.beside`), or else those of rigid trees."""
+    """`Constants.kernels` of tables for RECURSION, BATCHES or DERIVATIVES: where others have general kernels, special
+    ones that a process beside has compiled (`flexmb.run.beside`), or else the smallest of READY that serve."""
     general, found = GENERAL in features(c), contained(c)
     chosen = int(c.kernels[0])
     if not general:
         return chosen
-    if chosen == BESIDE or (chosen == BY_ITSELF and is_warm(found | {what})):
+    if what != DERIVATIVES and (chosen == BESIDE or (chosen == BY_ITSELF and is_warm(found | {what}))):
         return ITS_OWN
-    return RIGID_TREES if found <= OF_RIGID_TREES else chosen
+    fit = (number for number, ready in READY.items() if found <= ready.features and what in ready.serves)
+    return next(fit, chosen)
 
 
 def contained(c: SceneTables) -> frozenset[str]:

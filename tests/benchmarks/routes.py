@@ -42,9 +42,9 @@ class Evaluation:
 
 
 def articulated(system: fm.System) -> Evaluation:
-    """By articulated bodies, their modes eliminated as the system says."""
+    """By articulated bodies, their modes eliminated as the system says, with the kernels of explicit runs."""
     written = system.recursion_workspace()
-    arguments = 0.0, _start(system), system.recursion_constants, written
+    arguments = 0.0, _start(system), system.explicit_constants, written
     return Evaluation(entry.accelerations, _articulated, arguments)
 
 

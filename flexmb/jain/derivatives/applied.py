@@ -17,7 +17,7 @@ COORDINATES, SPEEDS, ROTATIONS = 0, 1, 2  # lanes
 @helper
 def subtract_applied(c, w, d):
     """Subtract the derivatives of w.speed.applied from `matrix`."""
-    if has(c, BALL_SPRINGS) or has(c, HINGE_SPRINGS) or has(c, COORDINATE_LAWS):
+    if (has(c, BALL_SPRINGS) or has(c, HINGE_SPRINGS) or has(c, COORDINATE_LAWS)) and _are_laws(c):
         _by_duals(c, w, d)
         return
     nu = w.u.shape[0]
@@ -27,6 +27,16 @@ def subtract_applied(c, w, d):
             d.matrix[place, place] += c.speed[j].stiffness
         if has(c, DAMPERS):
             d.matrix[place, nu + place] += c.speed[j].damping
+
+
+@helper
+def _are_laws(c):
+    """Whether there is more than springs and dampers of scalar coordinates, whose derivatives are known."""
+    found = c.hinge_spring.shape[0] > 0 or c.coordinate_law.shape[0] > 0
+    if has(c, BALL_SPRINGS):
+        for k in range(c.body.shape[0]):
+            found |= c.body[k].ball_spring != 0.0
+    return found
 
 
 @sweep
@@ -52,7 +62,7 @@ def _by_duals(c, w, d):
 def pull_applied(c, w, d, virtual, row):
     """Subtract virtual speeds (nu,) times the derivatives of w.speed.applied from a row (2nu,) in order of places."""
     nu = w.u.shape[0]
-    if has(c, BALL_SPRINGS) or has(c, HINGE_SPRINGS) or has(c, COORDINATE_LAWS):
+    if (has(c, BALL_SPRINGS) or has(c, HINGE_SPRINGS) or has(c, COORDINATE_LAWS)) and _are_laws(c):
         _pull_by_duals(c, w, d, virtual, row)
         return
     for j in range(nu):

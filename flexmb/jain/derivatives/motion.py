@@ -21,7 +21,7 @@ from flexmb.spatial.cross6 import motion_cross
 from flexmb.spatial.rows import store_column6
 from flexmb.spatial.spatial_vector import ZERO6, axpy6, scale6, shift_motion, store6, sum6, vec6
 from flexmb.spatial.vector import add, cross, mat3, matmul, store3, store9, sub, times, vec3
-from flexmb.tables.features import CONNECTORS, INBOARD_NODES, LOADS, MODES, OUTBOARD_NODES, WHEELS
+from flexmb.tables.features import CONNECTORS, INBOARD_NODES, LOADS, MODES, OUTBOARD_NODES, SEVERAL, WHEELS
 
 
 @helper
@@ -31,10 +31,10 @@ def move(c, w, d, k):
     store9(d.body[k].rotation, 0, R)
     store3(d.body[k].position, 0, r)
     R_O = outboard_rotation(c, w, d, k)
-    if axis.has_axis(c, k):
-        V, A = _single(c, w, d, k, R_O, r, V0, A0)
-    else:
+    if has(c, SEVERAL) and not axis.has_axis(c, k):
         V, A = several(c, w, d, k, R_O, r, V0, A0)
+    else:
+        V, A = _single(c, w, d, k, R_O, r, V0, A0)
     if has(c, OUTBOARD_NODES) and c.body[k].outboard_port >= 0:
         V, A = move_frame(c, w, d, k, R, r, V, A)
         r = sub(r, times(R, vec3(w.port[c.body[k].outboard_port].r, 0)))

@@ -18,27 +18,11 @@ from flexmb.spatial.cross6 import force_cross
 from flexmb.spatial.rows import column3, column6
 from flexmb.spatial.spatial_vector import shift_force, store6, sum6, vec6
 from flexmb.spatial.vector import add, axpy, cross, dot, mat3, plus_cross, rotate_sym, scale, store3, sub, sym6, vec3
-from flexmb.tables.features import (
-    ARMATURES,
-    CONNECTORS,
-    INBOARD_NODES,
-    LOADS,
-    MODES,
-    OUTBOARD_NODES,
-    SEVERAL,
-    WHEELS,
-)
+from flexmb.tables.features import ARMATURES
 
 ZERO3 = (0.0, 0.0, 0.0)
 NOTHING = (0.0, ZERO3, (*ZERO3, *ZERO3), (ZERO3, ZERO3, ZERO3), ZERO3, (ZERO3, ZERO3))
 _M, _S, _J, _N, _P, _F = 0, 1, 4, 10, 19, 22  # where `carried` has m, s, J, N, p and F
-
-
-@helper
-def is_rigid_tree(c):
-    """Whether a scene is a tree of rigid bodies on single axes without loads, wheels and connectors."""
-    on_nodes = has(c, MODES) or has(c, INBOARD_NODES) or has(c, OUTBOARD_NODES)
-    return not (on_nodes or has(c, SEVERAL) or has(c, LOADS) or has(c, WHEELS) or has(c, CONNECTORS))
 
 
 @helper

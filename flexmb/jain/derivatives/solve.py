@@ -11,7 +11,7 @@ from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.spatial.spatial_vector import store6, vec6
 from flexmb.spatial.vector import mat3, vec3
-from flexmb.tables.features import MODES
+from flexmb.tables.features import MODES, SEVERAL
 
 
 @helper
@@ -53,11 +53,11 @@ def _gains_of_hinge(c, w, d, k):
     """G of single axes, and G L of other hinges, in World axes about the base point; pivots of single axes."""
     R, r = mat3(d.body[k].rotation, 0), vec3(d.body[k].position, 0)
     first = d.places[k].hinge
-    if solve_bodies.is_single(c, w, k):
-        store6(d.gain[first], 0, force_to_world(R, r, vec6(w.body[k].gain, 0)))
-        d.factor[first] = 1.0 / w.body[k].inertia_along
-    else:
+    if has(c, SEVERAL) and not solve_bodies.is_single(w, k):
         for a in range(w.body[k].free_count):
             place = first + w.hinge[k].free_speed[a]
             store6(d.gain[place], 0, force_to_world(R, r, vec6(w.hinge[k].gain[a], 0)))
             d.factor[place] = 1.0 / w.hinge[k].factor[a, a]
+    else:
+        store6(d.gain[first], 0, force_to_world(R, r, vec6(w.body[k].gain, 0)))
+        d.factor[first] = 1.0 / w.body[k].inertia_along

@@ -70,9 +70,9 @@ def solve_block(c, w, d, at, bodies):
 
 
 @helper
-def is_single(c, w, k):
-    """Whether hinge k was eliminated by its single free axis."""
-    return not has(c, SEVERAL) or w.body[k].free_count == SINGLE
+def is_single(w, k):
+    """Whether hinge k was eliminated by its single free axis, in scenes where not all were."""
+    return w.body[k].free_count == SINGLE
 
 
 @helper
@@ -110,13 +110,13 @@ def _inward(c, w, d, k, at, z):
     if has(c, MODES):
         z = release_modes(c, w, d, k, at, z)
     first, slot = d.places[k].hinge, d.places[k].slot
-    if is_single(c, w, k):
+    if has(c, SEVERAL) and not is_single(w, k):
+        z = _innovate(c, w, d, k, at, z)
+    else:
         y = along(column6(d.seed, slot), z)
         y = minus_sum(block(d, d.matrix[first], at), y)
         put_block(d, d.matrix[first], at, y)
         z = plus6(vec6(d.gain[first], 0), y, z)
-    else:
-        z = _innovate(c, w, d, k, at, z)
     if has(c, MODES) and c.body[k].parent >= 0:
         load_modes(c, d, k, at, z)
     return z
@@ -144,13 +144,13 @@ def _outward(c, w, d, k, at, A):
     if has(c, MODES) and c.body[k].parent >= 0:
         A = moved_by_modes(c, d, k, at, A)
     first, slot = d.places[k].hinge, d.places[k].slot
-    if is_single(c, w, k):
+    if has(c, SEVERAL) and not is_single(w, k):
+        A = _solve(c, w, d, k, at, A)
+    else:
         x = along(vec6(d.gain[first], 0), A)
         x = less(scaled(d.factor[first], block(d, d.matrix[first], at)), x)
         put_block(d, d.matrix[first], at, x)
         A = plus6(column6(d.seed, slot), x, A)
-    else:
-        A = _solve(c, w, d, k, at, A)
     if has(c, MODES):
         answer_modes(c, w, d, k, at, A)
     if has(c, WHEELS):

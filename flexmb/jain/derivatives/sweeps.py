@@ -8,14 +8,14 @@ from flexmb.jain.derivatives.flexible import bend
 from flexmb.jain.derivatives.modes import mode_rows
 from flexmb.jain.derivatives.motion import move
 from flexmb.jain.derivatives.ports import clear_ports, move_ports
-from flexmb.jain.derivatives.rigid_trees import is_rigid_tree, rigid_tree
+from flexmb.jain.derivatives.rigid_trees import rigid_tree
 from flexmb.jain.derivatives.rows import add_answer, inward
 from flexmb.jain.derivatives.solve import solve, solve_with_inverse
 from flexmb.jain.derivatives.tables import BRANCHES
 from flexmb.jain.derivatives.work import differentiate_power
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, kernel
-from flexmb.tables.features import CONNECTORS, LOADS, MODES, PRESCRIBED, WHEELS
+from flexmb.tables.features import CONNECTORS, LOADS, MODES, PRESCRIBED, SEVERAL, WHEELS
 
 
 @kernel
@@ -25,14 +25,15 @@ def inverse_dynamics(c, w, d, masses):
     Needs the velocity sweep in w, that of poses if there are connectors, and udot in w.speed.acceleration.
     """
     clear_matrix(c, d, masses)
-    if is_rigid_tree(c):
+    # One of the two is not even compiled: a condition that no function hides is known before types are inferred.
+    if has(c, MODES) or has(c, SEVERAL) or has(c, LOADS) or has(c, WHEELS) or has(c, CONNECTORS):
+        forces_of_bodies(c, w, d)
+        rows_of_speeds(c, w, d, masses)
+    else:
         _copy_functions(c, w, d)
         for k in range(c.body.shape[0]):
             move(c, w, d, k)
         rigid_tree(c, w, d, masses)
-    else:
-        forces_of_bodies(c, w, d)
-        rows_of_speeds(c, w, d, masses)
 
 
 @helper

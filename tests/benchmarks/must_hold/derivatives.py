@@ -110,16 +110,16 @@ def _public(scene: Callable[[], fm.Scene], call: str) -> Measured:
 def _forward(scene: fm.Scene, times: int = 100) -> Call:
     system, y = _started(scene)
     out = np.zeros((3, system.nu, system.nu))
-    w = derivative_workspace(system.constants, system.nq, system.nu)
-    return Call(lambda: _accelerations(times, y, *out, system.constants, w), times, lambda: out.ravel())
+    c, w = system.derivative_constants, derivative_workspace(system.constants, system.nq, system.nu)
+    return Call(lambda: _accelerations(times, y, *out, c, w), times, lambda: out.ravel())
 
 
 def _inverse(scene: fm.Scene, times: int = 100) -> Call:
     system, y = _started(scene)
     rates = np.linspace(-1.0, 1.0, system.nu)
     out = np.zeros((3, system.nu, system.nu))
-    w = derivative_workspace(system.constants, system.nq, system.nu)
-    return Call(lambda: _inverse_dynamics(times, y, rates, *out, system.constants, w), times, lambda: out.ravel())
+    c, w = system.derivative_constants, derivative_workspace(system.constants, system.nq, system.nu)
+    return Call(lambda: _inverse_dynamics(times, y, rates, *out, c, w), times, lambda: out.ravel())
 
 
 def _flexible(modes: int) -> Measured:

@@ -11,8 +11,8 @@ import pytest
 import flexmb
 from flexmb.entry import derivatives
 from flexmb.entry.tangent import tangent_workspace
-from flexmb.jain.derivatives.rigid_trees import is_rigid_tree
 from flexmb.scene.schema import Scene
+from flexmb.tables.features import OF_SINGLE_AXES, contained
 from flexmb.tables.status import Status
 from tests import trees
 from tests.benchmarks.rivals import flexible_chain, rigid_chain
@@ -145,16 +145,17 @@ def test_by_displacement_and_by_force(seed):
         assert not matrix[~free].any() and not matrix[:, ~free].any()
 
 
+@pytest.mark.parametrize("kernels", ["special", "general"])  # of the latter those that are ready for such trees
 @pytest.mark.parametrize("seed", [0, 5])  # with long branches
-def test_special_kernels_of_rigid_trees_on_single_axes(seed):
+def test_kernels_of_rigid_trees_on_single_axes(seed, kernels):
     """They have sweeps of their own; M times the derivatives by forces is 1, in the lower triangle too."""
     scene = trees.random_scene(seed, trees.SINGLE)
     found = both(scene)
     assert found is not None
-    system = flexmb.compile(scene, kernels="special")
-    c, nq, nu = system.constants, system.nq, system.nu
+    system = flexmb.compile(scene, kernels=kernels)
+    c, nq, nu = system.derivative_constants, system.nq, system.nu
     parent = c.body["parent"].tolist()
-    assert is_rigid_tree.py_func(c) and len(set(parent)) < len(parent)
+    assert contained(c) <= OF_SINGLE_AXES and len(set(parent)) < len(parent)
     w = derivatives.derivative_workspace(c, nq, nu)
     assert len(w.tables.fork) and np.any(w.tables.places["new_point"][np.array(parent) >= 0])
     matrices = np.full((3, nu, nu), np.nan)

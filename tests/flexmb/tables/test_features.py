@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import copy
 import pickle
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -23,17 +26,35 @@ from flexmb.tables import features
 from flexmb.tables.arrays import Constants
 from flexmb.tables.status import OK
 from flexmb.typing import Real
+from tests.benchmarks.rivals import turns
 from tests.bounds import gamma
 from tests.flexmb.connectors.connected_scenes import everything as connected
 from tests.flexmb.connectors.connected_scenes import free_flying
-from tests.trees import EXACT, RIGID, Recipe, random_scene
+from tests.trees import EXACT, RIGID, SINGLE, Recipe, random_scene
 
+WORTH = 1.05  # times as fast as general kernels
 FEW = {"conservative": True, "wheels": 0, "point_masses": 0}
 AXES = Recipe(bodies=4, carriers=("rigid",), hinges=("revolute", "prismatic"), **FEW)
 RUTHLESS_CHAIN = Recipe(bodies=3, carriers=("beam",), levels=("ruthless",), hinges=("revolute",), **FEW)
 STRAINS_IN_A_PLANE = Recipe(bodies=1, carriers=("beam",), levels=("exact",), hinges=("revolute",), **FEW)
 STRAINS = Recipe(bodies=4, carriers=("beam",), levels=("exact",), hinges=("revolute",), **FEW)
 EVERYTHING = Recipe(bodies=8, levels=("full", "ruthless", "linear", "stiffened"))
+
+
+def evaluations(system: fm.System) -> Callable[[], object]:
+    return partial(system.evaluator(), 0.0, system.initial_state.q, system.initial_state.u)
+
+
+def derivatives(system: fm.System) -> Callable[[], object]:
+    return partial(system.derivative_evaluator(), 0.0, system.initial_state.q, system.initial_state.u)
+
+
+def copies(system: fm.System) -> Callable[[], object]:
+    q, u = (np.tile(each, (64, 1)) for each in (system.initial_state.q, system.initial_state.u))
+    return partial(system.accelerations_batch, q, u, threads=1)
+
+
+CALLS = {"accelerations": evaluations, "derivatives": derivatives, "copies": copies}
 
 
 def chain(bodies: int = 2, **hinge: float) -> fm.SceneBuilder:
@@ -66,7 +87,8 @@ def test_each_thing_has_its_name(exact):
     found = frozenset.union(*(fm.compile(scene).constants.features() for scene in scenes))
     named = {name: value for name, value in vars(features).items() if not name.startswith("_") and name.isupper()}
     names = {value for value in named.values() if isinstance(value, str)}
-    missing = names - {GENERAL, features.RECURSION, features.BATCHES} - {name.rstrip("0123456789- ") for name in found}
+    uses = {features.RECURSION, features.BATCHES, features.DERIVATIVES}
+    missing = names - {GENERAL} - uses - {name.rstrip("0123456789- ") for name in found}
     assert missing <= {features.BALL_SPRINGS}, missing  # drawn at random: another seed may have others
 
 
@@ -166,21 +188,77 @@ def test_rigid_trees_may_have_every_hinge_and_law_but_no_level_of_flexible_bodie
     assert levels & features.OF_RIGID_TREES == {RIGID_LEVEL}
 
 
-@pytest.mark.parametrize("scene", [random_scene(5, RIGID), chain(stiffness=2.0).scene()], ids=["drawn", "sprung"])
-def test_a_rigid_tree_has_kernels_without_modes(scene, monkeypatch):
+def test_single_axes_are_the_smaller_set():
+    """So that what they have not is a matter of a tree of rigid bodies, and a scene takes the smallest that serves."""
+    assert features.OF_SINGLE_AXES < features.OF_RIGID_TREES
+    assert [ready.features for ready in features.READY.values()] == [features.OF_SINGLE_AXES, features.OF_RIGID_TREES]
+
+
+@pytest.mark.parametrize(
+    ("scene", "found", "derivatives"),
+    [
+        (random_scene(5, RIGID), features.OF_RIGID_TREES, {GENERAL}),
+        (chain(stiffness=2.0).scene(), features.OF_SINGLE_AXES, features.OF_SINGLE_AXES),
+        (random_scene(0, SINGLE), features.OF_SINGLE_AXES, features.OF_SINGLE_AXES),
+    ],
+    ids=["drawn", "sprung", "single axes"],
+)
+def test_a_rigid_tree_has_kernels_without_modes(scene, found, derivatives, monkeypatch):
     """Ready ones, which compute what general ones do."""
     monkeypatch.setenv("FLEXMB_KERNELS", "general")
     system = fm.compile(scene)
     assert system.kernels == "general" and system.constants.features() == {GENERAL}
-    assert system.explicit_constants.features() == features.OF_RIGID_TREES
+    assert system.explicit_constants.features() == found
+    assert system.derivative_constants.features() == derivatives
     close(system, slope(system, 1.0), slope(system, 1.0, system.explicit_constants))
-    assert fm.compile(scene, kernels="special").explicit_constants.features() == features.contained(system.constants)
+    special = fm.compile(scene, kernels="special")
+    assert special.explicit_constants.features() == features.contained(system.constants)
+    assert special.derivative_constants.features() == features.contained(system.constants)
+
+
+def test_kernels_compiled_beside_are_not_those_of_derivatives(monkeypatch):
+    """Nobody waits for the compiler: derivatives keep what is ready."""
+    monkeypatch.setattr(features, "is_warm", lambda found: True)
+    monkeypatch.setattr(features, "unfit", lambda: "")
+    with features.asking("beside"):
+        system = fm.compile(chain().scene())
+    assert system.explicit_constants.features() == features.contained(system.constants)
+    assert system.derivative_constants.features() == features.OF_SINGLE_AXES
+
+
+@pytest.mark.parametrize("call", CALLS)
+def test_ready_kernels_of_single_axes_gain(call, monkeypatch):
+    """At least 5 %, or they are not worth their compilation; general ones against themselves do not gain so much."""
+    monkeypatch.setenv("FLEXMB_KERNELS", "general")
+    scene = chain(20).scene()
+    fast = CALLS[call](fm.compile(scene))
+    fast()
+    monkeypatch.setattr(features, "READY", {})
+    general = CALLS[call](fm.compile(scene))
+    gained = gain(general, fast)
+    assert gained >= WORTH
+    assert gain(general, CALLS[call](fm.compile(scene))) < (1.0 + gained) / 2.0
+
+
+def test_ready_kernels_of_rigid_trees_gain(monkeypatch):
+    monkeypatch.setenv("FLEXMB_KERNELS", "general")
+    scene = random_scene(5, replace(RIGID, bodies=30))
+    fast = CALLS["accelerations"](fm.compile(scene))
+    fast()
+    monkeypatch.setattr(features, "READY", {})
+    assert gain(CALLS["accelerations"](fm.compile(scene)), fast) >= WORTH
+
+
+def gain(general: Callable[[], object], fast: Callable[[], object]) -> float:
+    """How many times as fast, by the median over rounds in which both take turns."""
+    seconds = turns(general, fast)
+    return float(np.median(seconds[:, 0] / seconds[:, 1]))
 
 
 def test_trees_with_modes_and_linearised_runs_have_general_ones(monkeypatch):
     monkeypatch.setenv("FLEXMB_KERNELS", "general")
     assert fm.compile(random_scene(5, EVERYTHING)).explicit_constants.features() == {GENERAL}
-    for method, found in (("dop853", features.OF_RIGID_TREES), ("rk4", features.OF_RIGID_TREES), ("radau5", {GENERAL})):
+    for method, found in (("dop853", features.OF_SINGLE_AXES), ("rk4", features.OF_SINGLE_AXES), ("radau5", {GENERAL})):
         with integration(fm.compile(chain().scene()), "articulated", 0.0, INTEGRATORS[method]) as solve:
             assert solve._constants.features() == found
 
