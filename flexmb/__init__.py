@@ -18,6 +18,7 @@ _HOME = {
     "flexmb.advisor.advice": "Advice advise",
     "flexmb.closure.closures": "ClosureError",
     "flexmb.control.user": "user_function",
+    "flexmb.linear.base_excitation": "BaseExcitation base_excitation",
     "flexmb.linear.campbell": "Campbell campbell",
     "flexmb.linear.controlled_motion": "ControlledDerivatives ControlledMotion",
     "flexmb.linear.equilibrium": "Equilibrium equilibrium",
@@ -25,6 +26,7 @@ _HOME = {
     "flexmb.linear.linear_model": "LinearModel",
     "flexmb.linear.linearize": "linearize",
     "flexmb.linear.newton": "EquilibriumError",
+    "flexmb.linear.random_response": "RandomResponse SpectralDensity random_response",
     "flexmb.linear.spin": "steady_spin SteadySpin",
     "flexmb.run.batch_trajectory": "BatchTrajectory",
     "flexmb.run.envelope": "Envelope Extremes",
@@ -66,6 +68,8 @@ if TYPE_CHECKING:  # the same names for type checkers and editors, which do not 
     from flexmb.advisor.advice import advise as advise
     from flexmb.closure.closures import ClosureError as ClosureError
     from flexmb.control.user import user_function as user_function
+    from flexmb.linear.base_excitation import BaseExcitation as BaseExcitation
+    from flexmb.linear.base_excitation import base_excitation as base_excitation
     from flexmb.linear.campbell import Campbell as Campbell
     from flexmb.linear.campbell import campbell as campbell
     from flexmb.linear.controlled_motion import ControlledDerivatives as ControlledDerivatives
@@ -78,6 +82,9 @@ if TYPE_CHECKING:  # the same names for type checkers and editors, which do not 
     from flexmb.linear.linear_model import LinearModel as LinearModel
     from flexmb.linear.linearize import linearize as linearize
     from flexmb.linear.newton import EquilibriumError as EquilibriumError
+    from flexmb.linear.random_response import RandomResponse as RandomResponse
+    from flexmb.linear.random_response import SpectralDensity as SpectralDensity
+    from flexmb.linear.random_response import random_response as random_response
     from flexmb.linear.spin import SteadySpin as SteadySpin
     from flexmb.linear.spin import steady_spin as steady_spin
     from flexmb.run.batch_trajectory import BatchTrajectory as BatchTrajectory

@@ -94,6 +94,7 @@ TOO_LARGE: dict[str, list[tuple[Callable[[fm.Scene], object], str]]] = {
     "fit": [(lambda scene: fm.fit(scene, {"t": np.arange(200.0), "u": np.arange(200.0)}, ["a.mass_kg"]), FEWER)],
     "advise": [(lambda scene: fm.advise(scene, 1e-2, "energy.total"), FEWER)],
     "linearize": [(fm.linearize, DENSE)],
+    "base_excitation": [(fm.base_excitation, DENSE)],
     "equilibrium": [(fm.equilibrium, DENSE)],
     "equilibrium_path": [(lambda scene: fm.equilibrium_path(scene, "a.mass_kg", [1.0, 2.0]), DENSE)],
     "steady_spin": [(lambda scene: fm.steady_spin(scene, "i", 1.0), DENSE)],

@@ -18,6 +18,7 @@ from flexmb.cli.linearising import campbell, linearize
 from flexmb.cli.properties import mass
 from flexmb.cli.running import simulate
 from flexmb.cli.scenes import check, schema
+from flexmb.cli.vibrating import vibrate
 from flexmb.output.readers import outlive_readers
 
 app = typer.Typer(
@@ -52,7 +53,9 @@ def everything(
     """No text: the help of the application is above."""
 
 
-for command in (simulate, check, mass, equivalence, advise, linearize, campbell, export, reduce, schema, warmup):
+for command in (
+    simulate, check, mass, equivalence, advise, linearize, campbell, vibrate, export, reduce, schema, warmup
+):  # fmt: skip
     app.command()(command)
 app.command("import")(import_)  # `import` is a keyword and cannot be the name of a function
 

@@ -155,7 +155,7 @@ class LinearModel:
     def displacements_by(self, names: Sequence[str]) -> Real:
         """(len(names), n) displacements with these names, also dependent ones, by x[:n]; KeyError for other names."""
         self._refuse_torn()
-        return self.C[[_place(self.outputs, name, "output") for name in names], : len(self.rates)]
+        return self.C[[place(self.outputs, name, "output") for name in names], : len(self.rates)]
 
     @kept
     def eigenvalues(self) -> Complex:
@@ -206,27 +206,19 @@ class LinearModel:
         anything that is not a number.
         """
         self._refuse_torn()
-        column = _place(self.inputs, input, "input")
-        b = self.B[:, column]
-        rows = [_place(self.outputs, name, "output") for name in outputs] or list(range(len(self.outputs)))
+        column = place(self.inputs, input, "input")
+        rows = [place(self.outputs, name, "output") for name in outputs] or list(range(len(self.outputs)))
         frequencies = arguments.finite("omega", np.atleast_1d(arguments.array("omega", omega)))
         if frequencies.ndim != 1:
             raise ValueError(f"omega: give frequencies in a row, not an array of shape {frequencies.shape}")
-        out, unit = np.empty((len(frequencies), len(rows)), complex), np.eye(len(self.A))
-        C, d = self.C[rows], self.D[rows, column]
-        known = ~np.isnan(C).any(axis=1)
+        out = np.empty((len(frequencies), len(rows)), complex)
         for i, frequency in enumerate(frequencies):
-            try:
-                out[i] = C @ np.linalg.solve(1j * frequency * unit - self.A, b) + d
-            except np.linalg.LinAlgError:
-                out[i] = np.inf
-            if not np.isfinite(out[i][known]).all():
-                raise ValueError(f"omega = {frequency:g} rad/s is an undamped resonance: nothing is finite")
+            out[i] = harmonic(self, float(frequency), [column], rows)[:, 0]
         return out
 
     def marker_shape(self, mode: Mode, marker: str) -> Complex:
         """Displacement and rotation vector (6,) of a marker, World axes, in a mode as `Mode.shape` scales it."""
-        shape, first = self._shape(mode), _place(self.outputs, f"{marker}.x", "output")
+        shape, first = self._shape(mode), place(self.outputs, f"{marker}.x", "output")
         return self.C[first : first + 6, : len(self.rates)] @ shape
 
     def displaced(self, mode: Mode, size: float, phase: float = 0.0) -> State:
@@ -307,7 +299,22 @@ def modal_assurance(mass: Real, one: Complex, other: Complex) -> Real:
     return np.abs(a.conj().T @ b) ** 2
 
 
-def _place(names: tuple[tuple[str, str], ...], name: str, kind: str) -> int:
+def harmonic(model: LinearModel, omega: float, inputs: Sequence[int], outputs: Sequence[int]) -> Complex:
+    """(K,I) response of the outputs with numbers `outputs` to unit harmonic loads at omega (rad/s) of the inputs with
+    numbers `inputs`; ValueError at an undamped resonance."""
+    C, D = model.C[list(outputs)], model.D[np.ix_(outputs, inputs)].astype(complex)
+    known = ~np.isnan(C).any(axis=1)
+    try:
+        D += C @ np.linalg.solve(1j * omega * np.eye(len(model.A)) - model.A, model.B[:, list(inputs)])
+    except np.linalg.LinAlgError:
+        D[:] = np.inf
+    if not np.isfinite(D[known]).all():
+        raise ValueError(f"omega = {omega:g} rad/s is an undamped resonance: nothing is finite")
+    return D
+
+
+def place(names: tuple[tuple[str, str], ...], name: str, kind: str) -> int:
+    """The number of an input or output; KeyError if there is none of this name."""
     known = [found for found, _ in names]
     if name not in known:
         raise KeyError(f"no {kind} {name!r}; there are {', '.join(known)}")

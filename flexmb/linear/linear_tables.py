@@ -6,10 +6,12 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from flexmb.linear.base_excitation import DIRECTIONS, BaseExcitation
 from flexmb.linear.campbell import Campbell
 from flexmb.linear.linear_model import LinearModel
+from flexmb.linear.random_response import RandomResponse
 from flexmb.linear.truncation import Truncation
-from flexmb.output.listing import Listing, figures, prose
+from flexmb.output.listing import Listing, figures, names, prose
 from flexmb.typing import Real
 
 _COLOURS = {"asymptotically stable": "green", "neutral": "yellow", "unstable": "bold red"}
@@ -88,3 +90,44 @@ def campbell_table(result: Campbell) -> RenderableType:
     before = "" if first == 0 else f", not at {result.rates[first - 1]:g}"
     return Group(table, Text(f"unstable at {result.rates[first]:g} rad/s{before}", style="bold red"))
 
+
+def base_modes_table(excitation: BaseExcitation) -> RenderableType:
+    """Frequency, damping and shares of effective mass of every mode of what stands on the ground, and their sums."""
+    modes, model = excitation.modes, excitation.model
+    shares = [f"{name} %" for name in DIRECTIONS]
+    about = "of World through its origin"
+    table = Listing(
+        *figures("mode", "Hz", "damping ratio", *shares), *prose("dominant displacements"),
+        title=f"\nEffective masses of {model.scene}",
+        caption=f"Shares of all that stands on the ground, along x, y, z and about the axes {about}.",
+    )  # fmt: skip
+    energy = modes.shapes**2 * np.diag(model.mass)[:, None]
+    for j, (frequency, ratio, share) in enumerate(
+        zip(modes.frequencies_hz, modes.damping_ratios, modes.shares, strict=True)
+    ):
+        table.add(
+            str(j + 1), f"{frequency:.6g}", "" if np.isnan(ratio) else f"{ratio:.3g}", *_percent(share),
+            _dominant(model, energy[:, j] / np.sum(energy[:, j])),
+        )  # fmt: skip
+    table.add("all", "", "", *_percent(np.sum(modes.shares, axis=0)), "")
+    total = ", ".join(f"{name} {value:.6g}" for name, value in zip(DIRECTIONS, modes.total, strict=True))
+    return Group(table, Text(f"on the ground, kg and kg m²: {total}"))
+
+
+def _percent(shares: Real) -> list[str]:
+    return [f"{100.0 * share:.2f}" for share in shares]
+
+
+def random_table(response: RandomResponse) -> RenderableType:
+    """RMS and rate of zero crossings of every output that moves."""
+    inputs = "; ".join(f"{name}: {density.rms:.4g} RMS" for name, density in response.inputs.items())
+    table = Listing(
+        *names("output"), *figures("RMS", "unit", "crossings (Hz)"),
+        title=f"\nRandom response of {response.model.scene} to {inputs}",
+        caption="Outputs that do not move, but for rounding, are left out. Undetermined: by redundant closures.",
+    )  # fmt: skip
+    for i in np.flatnonzero(response.moves):
+        (name, unit), rms = response.outputs[i], response.rms[i]
+        cells = ("undetermined", unit, "") if np.isnan(rms) else (f"{rms:.5g}", unit, f"{response.crossings_hz[i]:.4g}")
+        table.add(name, *cells)
+    return table

@@ -23,9 +23,10 @@ COMMANDS = {
     "crosscheck stability": (cli.app, ["stability", "definiteness", "--depth", "0", "--out"]),
     "flexmb simulate": (flexmb_cli.app, ["simulate", SCENE, "--t-end", "0.1", "--out"]),
     "flexmb advise": (flexmb_cli.app, ["advise", SCENE, "--out"]),
+    "flexmb vibrate": (flexmb_cli.app, ["vibrate", SCENE, "--density", "1:1,2:1", "--picture"]),
     "flexmb campbell": (flexmb_cli.app, ["campbell", SCENE, "pivot", "--rates", "0:1:2", "--picture"]),
 }
-FILES = ("advise", "campbell")  # these write one file, whose folder is asked for
+FILES = ("advise", "campbell", "vibrate")  # these write one file, whose folder is asked for
 
 
 @pytest.fixture

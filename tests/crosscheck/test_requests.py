@@ -150,6 +150,7 @@ def test_names_in_a_sweep_are_looked_up_first(change: dict[str, str], suggestion
         (("advise", SCENE, "--quantity", "marker:tipp.position"), 'did you mean "marker:tip.position"?'),
         (("linearize", SCENE, "--spin", "pivot", "--rate", "1"), "does not spin about one axis"),
         (("campbell", SCENE, "pivot", "--rates", "0:1:2"), "does not spin about one axis"),
+        (("vibrate", SCENE, "--density", "1:1,2:1", "--output", "tipp.*"), "fits none of"),
         (("export", SCENE, "beem", "--out", "b.sid"), 'did you mean "beam"?'),
         (("equivalence", SCENE, "beem", "--axis", "y"), 'did you mean "beam"?'),
         (("warmup", SCENE, "--method", "dop85"), "use one of 'dop853'"),

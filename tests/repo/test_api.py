@@ -14,7 +14,8 @@ from tests.repo.project import ROOT
 FUNCTIONS = {
     "load_scene": ["path"], "compile": ["scene"], "linearize": ["system", "state"], "equilibrium": ["system", "guess"],
     "equilibrium_path": ["scene", "number", "values"], "steady_spin": ["system", "hinge", "rate"],
-    "campbell": ["system", "hinge", "rates"], "advise": ["scene", "tolerance", "quantity", "t_end"],
+    "base_excitation": ["system", "state", "held"], "campbell": ["system", "hinge", "rates"],
+    "advise": ["scene", "tolerance", "quantity", "t_end"], "random_response": ["model", "densities", "outputs"],
     "simulate": ["scene", "t_end", "method", "rtol", "atol", "algorithm"],
     "simulate_batch": ["copies", "t_end", "method", "q", "u", "threads", "rtol"], "compile_batch": ["scenes"],
 }  # fmt: skip

@@ -59,6 +59,7 @@ def dear(folder: Path) -> list[list[str]]:
     return [
         ["crosscheck", "engines"], ["flexmb", "mass", scene], ["flexmb", "linearize", scene, "--at", "initial"],
         ["flexmb", "campbell", scene, "shaft", "--rates", "0:4:3", "--picture", str(folder / "campbell.png")],
+        ["flexmb", "vibrate", scene, "--at", "initial"],
         ["flexmb", "simulate", scene, "--t-end", "0.1", "--error-estimate", "--no-plots", "--out", str(folder / "out")],
         ["crosscheck", "run", case, "-e", "native", "--verbose", "--fresh", "--out", out],
         ["crosscheck", "verify", case, str(csv)], ["crosscheck", "bench", case, "-e", "native", "--rounds", "1"],

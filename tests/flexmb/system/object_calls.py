@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 import flexmb as fm
+from flexmb.scene.shapes import beam_section
 from tests.flexmb.control.scenes import rotor
 from tests.flexmb.linear.truss import guided
 from tests.flexmb.system.argument_kinds import (
@@ -120,6 +121,9 @@ def _of_linear_models(w: World) -> Calls:
               lambda it: it.state, system=systems, hinge=names, rate=numbers, guess=but_none(states))  # fmt: skip
     found.add("campbell", fm.campbell, {"system": tree, "hinge": "rotor", "rates": np.array([0.5, 1.0])},
               lambda it: it.eigenvalues, system=systems, hinge=names, rates=series)  # fmt: skip
+    _of_random_vibration(found)
+    found.add("base_excitation", fm.base_excitation, {"system": tree, "state": state}, lambda it: it.model.A,
+              system=systems, state=but_none(states))  # fmt: skip
     spin, diagram = fm.steady_spin(tree, "rotor", 0.5), fm.campbell(tree, "rotor", np.array([0.5, 1.0]))
     found.add("SteadySpin.linearize", spin.linearize, {}, lambda it: it.A)
     found.add("Campbell, attributes", lambda: attributes(diagram))
@@ -140,6 +144,33 @@ def _of_linear_models(w: World) -> Calls:
                   lambda it: it if isinstance(it, str) else (it.A, it.B, it.C, it.D))  # fmt: skip
     found.add("LinearModel.save", lambda: written(model.save, "model.npz"))
     return found
+
+
+def _of_random_vibration(found: Calls) -> None:
+    """Of a beam on the ground, which is damped: only such has a response that is stationary."""
+    section = beam_section(E=7e10, G=2.7e10, A=1e-3, Iy=2e-7, Iz=1e-7, rho=2700.0)
+    modes = fm.Modes(count=2, families=("bending_y",), damping_ratio=0.02)
+    builder = fm.SceneBuilder("mast").beam("mast", length=2.0, elements=4, section=section, modes=modes)
+    scene = builder.weld("root", "ground", "mast").scene()
+    shaken, points = fm.base_excitation(scene), np.array([[1.0, 2.0], [30.0, 1.0]])
+    asked = {"model": shaken.model, "densities": {"base.y": points}, "outputs": ("load:root.force.y",)}
+    density, response = fm.SpectralDensity.of(points), fm.random_response(**asked)
+    found.add("BaseExcitation, attributes", lambda: attributes(shaken))
+    found.add("BaseModes, attributes", lambda: attributes(shaken.modes))
+    found.add("BaseModes.factors_about", shaken.modes.factors_about, {"point": np.array([0.0, 1.0, 2.0])},
+              point=vectors)  # fmt: skip
+    found.add("random_response", fm.random_response, asked, lambda it: it.rms,
+              model=chosen(None, "x", 5), densities=NO_MAPPING, outputs=chosen(("nobody",), (None,), 5))  # fmt: skip
+    for name in ("of", "in_g"):
+        found.add(f"SpectralDensity.{name}", getattr(fm.SpectralDensity, name), {"points": points},
+                  lambda it: it.values, points=chosen(None, "x", 5, points[:, 0], points[:1], -points))  # fmt: skip
+    found.add("SpectralDensity.at", density.at, {"frequencies_hz": np.array([2.0, 3.0])}, frequencies_hz=series)
+    found.add("SpectralDensity, attributes", lambda: attributes(density))
+    found.add("RandomResponse, attributes", lambda: attributes(response))
+    found.add("RandomResponse.density", response.density, {"frequencies_hz": np.array([2.0, 3.0])},
+              frequencies_hz=series)  # fmt: skip
+    found.add("RandomResponse.plot", lambda: written(response.plot, "response.png"))
+    found.add("RandomResponse.to_csv", lambda: written(response.to_csv, "response.csv"))
 
 
 def _of_controlled(w: World) -> Calls:
