@@ -63,7 +63,7 @@ def simulated(system: System, times: NDArray[np.float64], method: RunMethod, max
     """A run with output at `times` (s), from 0."""
     options = method.options()
     algorithm, settings = options.pop("algorithm"), Settings(**options, max_steps=max_steps)
-    return run_of_many(system, times, settings.checked(float(times[-1])), algorithm)
+    return run_of_many(system, times, settings.checked(float(times[-1])), algorithm).trajectory
 
 
 def simulated_within(

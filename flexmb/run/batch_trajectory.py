@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from flexmb.run.event_record import EventRecord
 from flexmb.run.outputs import ending
 from flexmb.system.batch import Batch
 from flexmb.tables import arguments
@@ -20,7 +21,9 @@ class BatchTrajectory:
 
     q (n,T,nq), u (n,T,nu) and work (n,T) J are as in `flexmb.Trajectory`, NaN at times that a run did not reach.
     `status` (n,) holds values of `flexmb.Status`, `stopped_at` (n,) s the time of the last good state of each run;
-    evaluations, accepted_steps, rejected_steps (n,) count. `batch.system(copy)` evaluates all other quantities.
+    evaluations, accepted_steps, rejected_steps (n,) count. `batch.system(copy)` evaluates all other quantities. Of
+    scenes with events or controllers: `events` (n) holds those of each copy, as `flexmb.Trajectory.events`, `signals`
+    those (n,T,k) of sensors and controllers by name, `messages` (n) how each run ended; all are empty for others.
     """
 
     batch: Batch
@@ -34,6 +37,9 @@ class BatchTrajectory:
     evaluations: Index
     accepted_steps: Index
     rejected_steps: Index
+    events: tuple[tuple[EventRecord, ...], ...] = ()
+    signals: dict[str, Real] = field(default_factory=dict)
+    messages: tuple[str, ...] = ()
 
     __repr__ = brief
 
@@ -52,6 +58,9 @@ class BatchTrajectory:
             arguments.held(name, getattr(self, name), shape)
         for name in ("fault", "evaluations", "accepted_steps", "rejected_steps"):
             arguments.held(name, getattr(self, name), (n,), "i")
+        for name in ("events", "messages"):
+            if len(getattr(self, name)) not in (0, n):
+                raise ValueError(f"there are {n} runs, but {name} of {len(getattr(self, name))}")
         if not self.batch.shares_constants and n != len(self.batch.systems):
             raise ValueError(f"there are {n} runs, but the batch has {len(self.batch.systems)} copies")
 
@@ -74,5 +83,7 @@ class BatchTrajectory:
         """How the run of a copy ended, in words; ValueError or TypeError for an invalid index."""
         self._refuse_torn()
         copy = arguments.index("copy", copy, len(self.status))
+        if self.messages:
+            return self.messages[copy]
         status, fault, t = int(self.status[copy]), int(self.fault[copy]), float(self.stopped_at[copy])
         return ending(self.batch.system(copy), Status(status), fault, t)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import _thread
 import os
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from flexmb.run.trajectory import Trajectory
@@ -57,13 +58,57 @@ def _idle_worker() -> _SpareThread:
     return _SpareThread()
 
 
-def interruptible(run: Callable[..., Any], arguments: tuple[Any, ...], stop: Index) -> tuple[Any, bool]:
+class Stop:
+    """Asks the runs of several threads to return soon; as `stop` of `interruptible` it is set like an array.
+
+    flags: of runs that are there from the beginning; those that begin later are covered by `covering`.
+    """
+
+    def __init__(self, flags: Index) -> None:
+        self._flags, self._running, self.asked = flags, dict[int, Index](), False
+
+    def __setitem__(self, place: int, value: int) -> None:
+        self.asked = True
+        self._flags[:] = value
+        for flag in list(self._running.values()):
+            flag[place] = value
+
+    @contextmanager
+    def covering(self) -> Iterator[None]:
+        """Runs that begin in this thread are covered."""
+        _own.stop = self
+        try:
+            yield
+        finally:
+            _own.stop = None
+
+    def run(self, run: Callable[..., Any], arguments: tuple[Any, ...], flag: Index) -> tuple[Any, bool]:
+        """The result of a run in this thread, and whether it was asked to return; `flag` is what it looks at."""
+        place = threading.get_ident()
+        self._running[place] = flag
+        if self.asked:  # before it was known to run
+            flag[0] = 1
+        try:
+            return run(*arguments), self.asked
+        finally:
+            del self._running[place]
+
+
+_own = threading.local()
+"""`stop`: the `Stop` that covers the runs of a thread."""
+
+
+def interruptible(run: Callable[..., Any], arguments: tuple[Any, ...], stop: Index | Stop) -> tuple[Any, bool]:
     """The result of `run`, and whether Ctrl-C was pressed, in which case stop[0] = 1 asks `run` to return soon.
 
     Python handles signals in the main thread, and only between its own instructions: so compiled code runs in another
-    thread, and the main one waits. When called from another thread, `run` is executed there and cannot be interrupted.
+    thread, and the main one waits. When called from another thread, `run` is executed there, and is interrupted only if
+    a `Stop` covers the runs of that thread.
     """
     if threading.current_thread() is not threading.main_thread():
+        cover: Stop | None = getattr(_own, "stop", None)
+        if cover is not None and not isinstance(stop, Stop):
+            return cover.run(run, arguments, stop)
         return run(*arguments), False
     done, found = _thread.allocate_lock(), list[Any]()  # a bare lock, because an Event costs as much as a short run
 

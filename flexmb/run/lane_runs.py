@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from copy import copy as fresh_copy
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
 from flexmb.entry import lanes
-from flexmb.integrate.control import COUNTS, STOP
+from flexmb.integrate.control import ACCEPTED, COUNTS, EVALUATIONS, REJECTED, SAMPLES, STOP
 from flexmb.integrate.dop853_lanes import dop853_lanes
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.lane_control import LaneControl, lane_control
@@ -29,9 +28,12 @@ from flexmb.integrate.settings import Settings
 from flexmb.integrate.watch import nothing_watched
 from flexmb.jit.lanes import LANES
 from flexmb.jit.pointer import Pointer
-from flexmb.run.origin import Beginning
+from flexmb.run.event_record import EventRecord
+from flexmb.run.interruption import Interrupted, Stop
 from flexmb.run.propagate import NO_STATES, PARTS, Integration, kept_for_watches, recursion, room_for
+from flexmb.run.simulate import Made, run_of_many
 from flexmb.run.times import segment_ends
+from flexmb.scene.control import UserLaw
 from flexmb.system import algorithms
 from flexmb.system.batch import Batch, LaneTables, in_threads
 from flexmb.system.system import System
@@ -76,13 +78,16 @@ class BatchRun:
     """Runs of the copies of a batch by one method.
 
     turned: by copy that has reached its end, which bodies turned too fast for their level at any step; bent: states
-    (K,1+nq+nu), see `flexmb.run.propagate.Raw`, in which its beams of level exact may have bent too far.
+    (K,1+nq+nu), see `flexmb.run.propagate.Raw`, in which its beams of level exact may have bent too far. whole: what
+    else came of copies of scenes with events or controllers. stop: asks all runs to return soon.
     """
 
     def __init__(self, batch: Batch, times: Real, settings: Settings, found: Runs) -> None:
         self._batch, self._times, self._settings, self._found = batch, times, settings, found
         self.turned: dict[int, list[TooFast]] = {}
         self.bent: dict[int, Real] = {}
+        self.whole: dict[int, WholeRun] = {}
+        self.stop = Stop(found.counts[:, STOP])
         self._kept = [kept_for_watches(system) for system in batch.systems]
         self._strained = len(batch.systems[0].constants.section) > 0
         fixed = settings.integrator.fixed
@@ -90,14 +95,18 @@ class BatchRun:
 
     def __call__(self, n: int, threads: int) -> None:
         """Run the first n copies."""
-        controlled = bool(self._batch.systems[0].scene.controllers)
-        in_lanes = self._batch.in_lanes and not controlled and self._settings.method in _IN_LANES
+        scene = self._batch.systems[0].scene
+        if scene.events or scene.controllers:
+            calls_python = any(isinstance(controller, UserLaw) for controller in scene.controllers)
+            in_threads(self._by_themselves, range(n), 1 if calls_python else threads)
+            return
+        in_lanes = self._batch.in_lanes and self._settings.method in _IN_LANES
         blocks = list(range(0, n, LANES)) if in_lanes else []
         if blocks:
             in_threads(self._in_lanes, blocks, threads)
             self.turned = {copy: found for copy, found in self.turned.items() if copy < n}  # the last one fills a block
         left = [copy for copy in range(n) if self._found.status[copy] == _NOT_YET]
-        in_threads(self._alone, left, threads if self._batch.in_lanes and not controlled else 1)
+        in_threads(self._alone, left, threads if self._batch.in_lanes else 1)
 
     @staticmethod
     def _block_of(of_systems: Sequence[_Each], first: int) -> list[_Each]:
@@ -217,6 +226,51 @@ class BatchRun:
                 if "level_range" not in system.scene.allow and (turned := _too_fast(system, solve.fastest)):
                     self.turned[copy] = turned
 
+    def _by_themselves(self, copies: Iterable[int]) -> None:
+        """Run copies as `simulate` does: events end the segments of one copy, laws have own states."""
+        found, n = self._found, self._batch.nq
+        with self.stop.covering():
+            for copy in copies:
+                system, y = self._batch.system(copy), found.y[copy]
+                try:
+                    state = system.state(y[:n], y[n:-1])
+                    made = run_of_many(system, self._times, self._settings, "articulated", state)
+                except Interrupted:
+                    found.status[copy] = INTERRUPTED
+                    return
+                except (ValueError, DynamicsError) as error:  # of this copy's state
+                    found.status[copy], self.whole[copy] = NONFINITE, WholeRun(str(error), (), {}, ())
+                    continue
+                self._take(copy, system, made)
+
+    def _take(self, copy: int, system: System, made: Made) -> None:
+        """Keep what such a run came to; an output after events at its end is left out."""
+        run, found, cost = made.trajectory, self._found, made.trajectory.statistics
+        last = int(np.searchsorted(self._times, run.t[-1], side="right")) if len(run.t) else 0
+        rows = slice(0, min(last, len(run.t)))
+        found.out[copy, rows] = np.column_stack([run.q, run.u, run.work])[rows]
+        counts = found.counts[copy]
+        counts[SAMPLES], counts[EVALUATIONS] = rows.stop, cost.evaluations
+        counts[ACCEPTED], counts[REJECTED] = cost.accepted_steps, cost.rejected_steps
+        found.status[copy], found.stopped_at[copy] = int(run.status), run.stopped_at
+        doubts = tuple(str(warning) for warning in made.warned)
+        signals = {name: values[rows] for name, values in run.signals.items()}
+        self.whole[copy] = WholeRun(run.message, run.events, signals, doubts)
+        if made.fastest and run.finished:
+            self.bent[copy] = np.vstack(made.fastest)
+            if "level_range" not in system.scene.allow and (turned := _too_fast(system, self.bent[copy])):
+                self.turned[copy] = turned
+
+
+class WholeRun(NamedTuple):
+    """How the run of a copy ended, in words; its events; signals (T,k) by name; what its events made
+    doubtful."""
+
+    message: str
+    events: tuple[EventRecord, ...]
+    signals: Mapping[str, Real]
+    doubts: tuple[str, ...]
+
 
 def _too_fast(system: System, states: Real) -> list[TooFast]:
     """By the fastest states (K,1+nq+nu) of a run."""
@@ -227,14 +281,13 @@ def _too_fast(system: System, states: Real) -> list[TooFast]:
 
 
 class Alone:
-    """Single runs of copies of one system; controllers are initialised for each run."""
+    """Single runs of copies of one system without controllers."""
 
     def __init__(self, system: System, method: Integrator) -> None:
         self._method = method
         self._whole: Integration | None = None
-        if system.scene.controllers or system.scene.constraints or method.linearises:
-            self._own = fresh_copy(system) if system.scene.controllers else system  # controllers write into its tables
-            self._whole = Integration(self._own, algorithms.chosen("articulated"), self._own.route(), method)
+        if system.scene.constraints or method.linearises:
+            self._whole = Integration(system, algorithms.chosen("articulated"), system.route(), method)
         else:  # all modes are eliminated explicitly, as in lanes, so that both give the same results
             self._workspace = system.workspace()
             self._problem = recursion(system.constants, self._workspace)
@@ -243,21 +296,13 @@ class Alone:
                 self._problem, self._record = recorded(self._problem, 0, room_for(kept))
 
     def __call__(self, y: Real, clock: Clock, accuracy: Accuracy, out: Real, counts: Index) -> tuple[int, float]:
-        """See `Integrator`; out (T,nq+nu+1) does not contain the states of controllers."""
+        """See `Integrator`."""
         whole, memory, watch = self._whole, self._method.memory, nothing_watched()
         if whole is None:
             if self._record is not None:
                 self._record.fastest.begin(clock.times)
             return self._method.run(self._problem, y, clock, accuracy, out, counts, memory(len(y)), watch)
-        if whole.feedback is None:
-            return whole(y, clock, accuracy, out, counts, memory(len(y)), watch)
-        begin = Beginning(self._own.layout.known(float(clock.times[0]), y), y, None)
-        y, clock, accuracy = whole.begin(begin, clock, accuracy, counts)
-        rows = np.empty((len(out), len(y)))
-        status, t = whole(y, clock, accuracy, rows, counts, memory(len(y)), watch)
-        whole.ended(None)
-        out[:, :-1], out[:, -1] = rows[:, : out.shape[1] - 1], rows[:, -1]
-        return status, t
+        return whole(y, clock, accuracy, out, counts, memory(len(y)), watch)
 
     @property
     def fastest(self) -> Real:

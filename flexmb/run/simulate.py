@@ -162,19 +162,21 @@ def run_with_course(system: System, times: Real, settings: Settings) -> tuple[Tr
     return run, course
 
 
-def run_of_many(system: System, times: Real, settings: Settings, algorithm: Algorithm) -> Trajectory:
-    """The trajectory of a scene from its own initial state, as `simulate` makes it, without its warnings: one of many
-    that are compared with one another. Watches of accuracy do not look at it."""
+def run_of_many(
+    system: System, times: Real, settings: Settings, algorithm: Algorithm, state: State | None = None
+) -> Made:
+    """A run from a state (default: the scene's own), as `simulate` makes it, one of many: it warns of nothing, and
+    watches of accuracy have not looked at it."""
     refuse_large_run(system, len(times), settings, algorithm)
     if settings.integrator.linearises:
         refuse_without_jacobian(system, algorithm, settings.method)
-    run, _, was_interrupted, _ = _run(RunPart(system, times), None, settings, algorithm, 0.0)
-    if was_interrupted or run.status is Status.INTERRUPTED:
-        raise Interrupted(run)
-    return run
+    made = _run(RunPart(system, times), state, settings, algorithm, 0.0)
+    if made.was_interrupted or made.trajectory.status is Status.INTERRUPTED:
+        raise Interrupted(made.trajectory)
+    return made
 
 
-class _Made(NamedTuple):
+class Made(NamedTuple):
     """The trajectory of one stage, what there is to warn of, whether Ctrl-C ended it, and its fastest states, each
     (K,1+nq+nu): see `flexmb.run.propagate.Raw`."""
 
@@ -187,7 +189,7 @@ class _Made(NamedTuple):
 def _run(
     stage: RunPart, state: Given, settings: Settings, algorithm: Algorithm, stabilise: float,
     course: list[Leg] | None = None,
-) -> _Made:  # fmt: skip
+) -> Made:  # fmt: skip
     """One stage; course: see `Driver`."""
     system, times = stage
     t = float(times[0])
@@ -196,7 +198,7 @@ def _run(
     if start is not None and start.status != Status.OK:
         raw = unmoved(begin, Status(start.status), start.fault)
         with integration(system, algorithm, stabilise, settings.integrator) as solve:
-            return _Made(observed(system, times, raw, algorithm, solve), [], False, [])
+            return Made(observed(system, times, raw, algorithm, solve), [], False, [])
     again = partial(_again, stage, state, algorithm, stabilise)
     made_by = Making(system, times, settings, again)
     driver = Driver(system, times, settings, algorithm, stabilise, begin.events, made_by)
@@ -210,7 +212,7 @@ def _run(
     if start is not None and start.is_low:
         warned.append(PrecisionWarning(start.warning))
         trajectory = replace(trajectory, message=f"{trajectory.message}; at the start {start.warning}")
-    return _Made(trajectory, warned, driver.was_interrupted, driver.fastest)
+    return Made(trajectory, warned, driver.was_interrupted, driver.fastest)
 
 
 def _followed(
@@ -230,7 +232,7 @@ def _followed(
     return follow([Stretch(leg.system, leg.begin, leg.raw.t) for leg in course], until)
 
 
-def _looked_at(system: System, made: _Made) -> tuple[Trajectory, list[Warning], bool]:
+def _looked_at(system: System, made: Made) -> tuple[Trajectory, list[Warning], bool]:
     """Trajectory, warnings and interruption, with what watches of accuracy say of the samples and the fastest steps."""
     trajectory, warned, was_interrupted, fastest = made
     t, q, u = trajectory.t, trajectory.q, trajectory.u

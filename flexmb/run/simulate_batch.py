@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
-from flexmb.integrate.control import ACCEPTED, EVALUATIONS, REJECTED, SAMPLES, STOP
+from flexmb.integrate.control import ACCEPTED, EVALUATIONS, REJECTED, SAMPLES
 from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
 from flexmb.jit.lanes import LANES
 from flexmb.run.batch_trajectory import BatchTrajectory
 from flexmb.run.beside import computed
 from flexmb.run.interruption import interruptible
-from flexmb.run.lane_runs import BatchRun, Runs, runs
+from flexmb.run.lane_runs import BatchRun, Runs, WholeRun, runs
 from flexmb.run.propagate import NO_STATES
 from flexmb.run.simulate import RunSettings, refuse_unknown, refuse_without_jacobian
 from flexmb.run.times import refuse_times, sample_times
@@ -56,8 +56,9 @@ def simulate_batch(
     compiled system, whose copies differ in their initial states. q (n,nq), u (n,nu): initial coordinates and speeds of
     all copies, by default those of the scenes. method, samples and settings: see `simulate`. "rk4" and "dop853" run
     eight copies at once in SIMD lanes of the processor; with "dop853" each copy has its own steps. The other methods,
-    and scenes with closures or controllers, run one copy after the other. In lanes all modes are eliminated explicitly.
-    threads: number of threads, by default one per processor.
+    and scenes with closures, run one copy after the other. Those with events or controllers run copy by copy in threads
+    (one thread for laws in Python), each bit-identical to `simulate` from the same state; events and signals are in the
+    result. In lanes all modes are eliminated explicitly. threads: number of threads, by default one per processor.
 
     A run that fails raises nothing and does not affect the others: `status` and `message` of the result say why it
     stopped. Raises SceneError, ValueError, TypeError or NotImplementedError as `simulate` does, ValueError for states
@@ -73,8 +74,6 @@ def simulate_batch(
         refuse_without_jacobian(batch.systems[0], "articulated", method)
     for system in batch.systems:
         refuse_times(system, 0.0, t_end)
-        if system.scene.events:
-            raise NotImplementedError(f'scene "{system.scene.name}" has events: run its copies one by one by simulate')
     times = sample_times(samples, t_end)
     rows = batch.states(*_given(batch, q, u))
     number = number_of_threads(threads, -(-len(rows[0]) // LANES))
@@ -82,17 +81,18 @@ def simulate_batch(
     found = runs(*rows, len(times))
     turned: dict[int, list[TooFast]] = {}
     bent: dict[int, Real] = {}
+    whole: dict[int, WholeRun] = {}
     if len(rows[0]):
-        start, stop = perf_counter(), found.counts.T[STOP : STOP + 1]  # stops all runs at once
-        runner = BatchRun(batch, times, chosen, found)
-        _, interrupted = interruptible(runner, (len(rows[0]), number), stop)
+        start, runner = perf_counter(), BatchRun(batch, times, chosen, found)
+        _, interrupted = interruptible(runner, (len(rows[0]), number), runner.stop)
         if interrupted:
             raise KeyboardInterrupt
-        turned, bent = runner.turned, runner.bent
-        if batch.in_lanes and not chosen.integrator.linearises and not batch.system(0).scene.controllers:
+        turned, bent, whole = runner.turned, runner.bent, runner.whole
+        scene = batch.system(0).scene
+        if batch.in_lanes and not chosen.integrator.linearises and not scene.controllers and not scene.events:
             computed(batch.system(0), perf_counter() - start, BATCHES)
-    made = _gathered(batch, times, found, len(rows[0]))
-    for warning in _watched(made, turned, bent):
+    made = _gathered(batch, times, found, len(rows[0]), whole)
+    for warning in (*_doubted(batch, whole), *_watched(made, turned, bent)):
         warnings.warn(warning, SceneWarning, stacklevel=2)
     return made
 
@@ -117,6 +117,16 @@ def _watched(runs: BatchTrajectory, turned: Mapping[int, Sequence[TooFast]], ben
         yield f'scene "{batch.systems[0].scene.name}": {alike[worst]}{_called(sorted(alike), worst)}'
 
 
+def _doubted(batch: Batch, whole: Mapping[int, WholeRun]) -> Iterator[str]:
+    """What events have made doubtful: each once, with the numbers of all copies that say it."""
+    found = dict[str, list[int]]()
+    for copy in sorted(whole):
+        for doubt in whole[copy].doubts:
+            found.setdefault(doubt, []).append(copy)
+    for doubt, copies in found.items():
+        yield f'scene "{batch.systems[0].scene.name}": {doubt}{_called(copies)}'
+
+
 def _leaves_out(system: System) -> bool:
     """Whether the watch of few modes has to look, which the first copy tells for all."""
     if system.is_rigid:
@@ -138,16 +148,17 @@ def _seen(runs: BatchTrajectory, copy: int, turned: Sequence[TooFast], bent: Rea
     return WatchedStates(system, t, q, u, turns, failed, fastest=bent, turned=None if failed else turned)
 
 
-def _called(copies: list[int], worst: int) -> str:
+def _called(copies: list[int], worst: int | None = None) -> str:
     """The numbers of copies, which ascend, as words: not more than NAMED ranges of them."""
     if len(copies) == 1:
-        return f" (copy {worst})"
+        return f" (copy {copies[0]})"
     steps = np.flatnonzero(np.diff(copies) > 1)
     ranges = [(int(each[0]), int(each[-1])) for each in np.split(copies, steps + 1)]
     words = [str(i) if i == j else f"{i} to {j}" for i, j in ranges[:NAMED]]
     left = sum(j - i + 1 for i, j in ranges[NAMED:])
     more = f" and {left} more" if left else ""
-    return f" (copies {', '.join(words)}{more}; copy {worst} is the worst)"
+    most = "" if worst is None else f"; copy {worst} is the worst"
+    return f" (copies {', '.join(words)}{more}{most})"
 
 
 def _given(batch: Batch, q: Any, u: Any) -> tuple[Any, Any]:
@@ -169,7 +180,17 @@ def _refuse_too_many(n: int, samples: int, batch: Batch) -> None:
     refuse_bytes(size, f"{n} copies at {samples} output times take", remedy)
 
 
-def _gathered(batch: Batch, times: Real, found: Runs, n: int) -> BatchTrajectory:
+def _signals(whole: Mapping[int, WholeRun], n: int, samples: int) -> dict[str, Real]:
+    """Signals (n,T,k) by name; NaN at times that a run did not reach."""
+    found = dict[str, Real]()
+    for copy, run in whole.items():
+        for name, values in run.signals.items():
+            every = found.setdefault(name, np.full((n, samples, values.shape[1]), np.nan))
+            every[copy, : len(values)] = values
+    return found
+
+
+def _gathered(batch: Batch, times: Real, found: Runs, n: int, whole: Mapping[int, WholeRun]) -> BatchTrajectory:
     """The result for n copies; values at times that a run did not reach are NaN."""
     states, counts = found.out[:n], found.counts[:n]
     states[np.arange(len(times)) >= counts[:, SAMPLES, None]] = np.nan
@@ -185,4 +206,7 @@ def _gathered(batch: Batch, times: Real, found: Runs, n: int) -> BatchTrajectory
         evaluations=counts[:, EVALUATIONS],
         accepted_steps=counts[:, ACCEPTED],
         rejected_steps=counts[:, REJECTED],
+        events=tuple(whole[copy].events for copy in range(n)) if whole else (),
+        signals=_signals(whole, n, len(times)),
+        messages=tuple(whole[copy].message for copy in range(n)) if whole else (),
     )

@@ -197,8 +197,6 @@ def test_steps_are_counted_over_all_pieces_and_a_stopped_run_goes_on():
 
 def test_what_events_cannot_do_is_refused():
     with pytest.raises(NotImplementedError, match="has events"):
-        fm.simulate_batch([ball(1.0, impact(1.0))], 1.0)
-    with pytest.raises(NotImplementedError, match="has events"):
         fm.simulate_stages(ball(1.0, impact(1.0)), [fm.RunStage(1.0), fm.RunStage(1.0)])
 
 

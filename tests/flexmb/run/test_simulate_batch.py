@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from threading import Barrier, Thread
+from time import sleep
+
 import numpy as np
 import pytest
 from msgspec.structs import replace
 
 import flexmb as fm
+from flexmb.run.interruption import Stop, interruptible
 from flexmb.run.simulate_batch import simulate_batch
 from flexmb.scene.build import SceneBuilder
 from tests.bounds import gamma
@@ -176,3 +180,90 @@ def test_what_makes_no_sense_is_refused(system):
         simulate_batch(system, -1.0, q=q, u=u)
     with pytest.raises(ValueError, match="fewer samples"):
         simulate_batch(system, T_END, q=np.zeros((20000, 2)), u=np.zeros((20000, 2)), samples=100000)
+
+
+def latching() -> fm.Scene:
+    """A boom that latches when it is straight, and a scene that ends when its second link passes an angle."""
+    return fm.load_scene("cases/deploying_boom/latching/scene.toml")
+
+
+def ending() -> fm.Scene:
+    end = fm.SceneEvent(name="far", watch="h1.rotation", level=0.3, actions=(fm.EndRun(),))
+    return replace(pendulum(), events=(end,))
+
+
+def controlled() -> fm.Scene:
+    return fm.load_scene("cases/control/servos/scene.toml")
+
+
+@pytest.mark.parametrize(
+    ("scene", "t_end"), [(latching, 3.0), (ending, 2.0), (controlled, 0.3)], ids=["latches", "ends", "controlled"]
+)
+def test_copies_with_events_and_controllers_are_those_of_simulate(scene, t_end):
+    system, n = fm.compile(scene()), 5
+    q, u = system.initial_state.q, system.initial_state.u
+    u = u + 1e-3 * np.random.default_rng(1).standard_normal((n, system.nu))
+    runs = simulate_batch(system, t_end, u=u, samples=11, threads=3, **FINE)
+    assert len(runs.events) == len(runs.messages) == n
+    for copy in range(n):
+        alone = fm.simulate(system, t_end, state=system.state(q, u[copy]), samples=11, **FINE)
+        reached = int(np.sum(runs.t <= alone.t[-1]))
+        np.testing.assert_array_equal(runs.q[copy, :reached], alone.q[:reached])
+        np.testing.assert_array_equal(runs.u[copy, :reached], alone.u[:reached])
+        np.testing.assert_array_equal(runs.work[copy, :reached], alone.work[:reached])
+        assert np.all(np.isnan(runs.q[copy, reached:]))
+        assert [(e.name, e.t) for e in runs.events[copy]] == [(e.name, e.t) for e in alone.events]
+        assert (runs.message(copy), runs.stopped_at[copy]) == (alone.message, alone.stopped_at)
+        assert runs.accepted_steps[copy] == alone.statistics.accepted_steps
+        for name, values in alone.signals.items():
+            np.testing.assert_array_equal(runs.signals[name][copy, :reached], values[:reached])
+    assert any(runs.events) or system.scene.controllers
+    assert len({events[0].t for events in runs.events if events}) in (0, n)  # each at its own instant
+
+
+def test_a_copy_with_events_that_fails_leaves_the_others():
+    system = fm.compile(ending())
+    start = system.initial_state
+    u = np.array([start.u, [1e160, -1e160], start.u])
+    runs = simulate_batch(system, 0.3, u=u, samples=4, **FINE)
+    assert runs.failed.tolist() == [1] and runs.message(1)
+    assert np.all(np.isfinite(runs.q[[0, 2]])) or runs.events[0]
+
+
+def test_each_copy_has_the_numbers_of_its_scene_and_its_own_instants():
+    scenes = [latching().with_values({"gravity_m_s2.2": value}) for value in (0.0, -0.1, -0.2)]
+    runs = simulate_batch(scenes, 3.0, samples=3, **FINE)
+    for copy, scene in enumerate(scenes):
+        alone = fm.simulate(scene, 3.0, samples=3, **FINE)
+        assert [(e.name, e.t) for e in runs.events[copy]] == [(e.name, e.t) for e in alone.events]
+        np.testing.assert_array_equal(runs.q[copy], alone.q)
+
+
+def test_ctrl_c_reaches_runs_in_other_threads():
+    """All that run now are asked to return, and those that begin afterwards."""
+    flags, inside = np.zeros(4, np.int64), Barrier(3)
+    stop, asked = Stop(flags[:2]), list[tuple[bool, bool]]()
+
+    def work(own: np.ndarray) -> None:
+        def run() -> bool:
+            inside.wait(5.0)
+            while not own[0]:
+                sleep(1e-3)
+            return True
+
+        with stop.covering():
+            asked.append(interruptible(run, (), own))
+
+    threads = [Thread(target=work, args=(flags[i : i + 1],)) for i in (2, 3)]
+    for thread in threads:
+        thread.start()
+    inside.wait(5.0)
+    stop[0] = 1
+    for thread in threads:
+        thread.join(5.0)
+    assert asked == [(True, True)] * 2 and np.all(flags == 1)
+    late = np.zeros(1, np.int64)
+    done = Thread(target=lambda: stop.run(lambda: None, (), late))
+    done.start()
+    done.join(5.0)
+    assert late[0] == 1
