@@ -90,6 +90,7 @@ class Blocks:
                     chain=self.chain,
                     c=dual.constants,
                     cc=dual.closures,
+                    driven=np.array(list(system.signals), np.int64),
                     y=np.zeros(len(self.state[0])),
                     slope=np.zeros(len(self.state[0])),
                     x=chain_rates(w, system.closures.constants[1]),

@@ -22,7 +22,7 @@ from flexmb.spatial.spatial_vector import store6, times6
 from flexmb.spatial.vector import mat3
 from flexmb.tables.arrays import Constants
 from flexmb.tables.status import OK
-from flexmb.typing import Real
+from flexmb.typing import Index, Real
 
 
 @bundle
@@ -36,12 +36,16 @@ class ClosureLoads:
 
 @bundle
 class ChainBlock:
-    """A chain of floats, and constants and workspace of a block in duals."""
+    """A chain of floats, and constants and workspace of a block in duals.
+
+    driven (F,): functions of time that controllers drive, in duals; the chain takes their values.
+    """
 
     chain: Closed
     c: Constants
     cc: ClosureConstants
     x: ChainRates
+    driven: Index
     y: Real  # (nq+nu+1,) the state without derivatives, and its rate
     slope: Real
 
@@ -53,6 +57,9 @@ def motion(t, s):
     for i in range(s.y.shape[0]):
         s.y[i] = w.state[i].real
     w.time[0] = t
+    for i in range(s.driven.shape[0]):
+        f = s.driven[i]
+        s.chain.c.function[f].data[0] = s.c.function[f].data[0].real
     status = slope(t, s.y, s.slope, s.chain)
     return evaluate_held(s.chain, s.c, w, s.cc, x.cw) if status == OK else status
 

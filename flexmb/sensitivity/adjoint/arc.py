@@ -103,6 +103,12 @@ class Plain:
         putting = addresses(self._route.project, VOID, REAL, VECTOR, self.constants)
         return np.array([moving[0], putting[0], *moving[1:]])
 
+    def begin(self, t: float, y: Real) -> None:
+        """A closed chain takes the rows of its closures that are independent at a state y (n,); a controlled run has
+        integrated with another chain."""
+        if self.system.closures is not None:
+            self.system.closures.begin_in(self.constants, t, y)
+
     @property
     def fault(self) -> int:
         """Index of the item at which the last evaluation failed."""
@@ -174,6 +180,7 @@ class Arc:
         for i in wanted:
             first = i // every * every
             s.y[:] = self._record.state[i // every]
+            self._plain.begin(float(self.t[first]), s.y)
             self._check(stages.forwards(first, i, s), float(self.t[first]))
             found.append(s.y.copy())
         return found
@@ -214,6 +221,7 @@ class Arc:
             if values is not None:
                 held.hold(values)
             s.y[:] = self._record.state[first // every]
+            self._plain.begin(float(self.t[first]), s.y)
             self._check(stages.forwards(first, stop, s), float(self.t[first]))
             upper = stop
             for i in [*(i for i in range(stop - 1, first, -1) if i in places or i % ROWS_HOLD == 0), first]:

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from flexmb.closure.tables import Closed
 from flexmb.control import variation
 from flexmb.control.tables import APPLY
 from flexmb.jit.duals import RATES
@@ -107,7 +108,8 @@ class SampledLoop:
 
 
 class DrivenFunctions(NamedTuple):
-    """Functions of time (F,) that controllers drive, and all constants that have them."""
+    """Functions of time (F,) that controllers drive, and all constants that have them; of closed chains their `Closed`,
+    too."""
 
     functions: Index
     constants: Sequence[Any]
@@ -115,7 +117,7 @@ class DrivenFunctions(NamedTuple):
     def hold(self, values: Real) -> None:
         """Set their values (F,)."""
         for constant in self.constants:
-            hold(constant, self.functions, values)
+            hold(constant.c if isinstance(constant, Closed) else constant, self.functions, values)
 
 
 @kernel

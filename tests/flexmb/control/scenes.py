@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import msgspec
+
 import flexmb as fm
+from tests.repo.project import ROOT
 
 INERTIA = 0.8  # kg m^2, about the axis
 STIFFNESS, DAMPING = 3.0, 0.4
@@ -49,3 +52,14 @@ def tossed(*parts: Any) -> fm.SceneBuilder:
         .marker("tip", "hub", offset=(0.3, -0.2, 0.5))
         .add(*parts)
     )
+
+
+def driven_four_bar(**sampling: float) -> fm.Scene:
+    """A four-bar whose crank a PID controller drives."""
+    scene = fm.load_scene(ROOT / "cases" / "closed_chains" / "four_bar" / "scene.toml")
+    crank = next(hinge for hinge in scene.hinges if hinge.name == "drive")
+    turn = msgspec.structs.replace(crank.rotation, torque_Nm=fm.ControlSignal(source="servo", gain=0.8))
+    hinges = [msgspec.structs.replace(each, rotation=turn) if each is crank else each for each in scene.hinges]
+    sensors = (fm.CoordinateSensor(name="angle", of="drive"),)
+    law = fm.Pid(name="servo", inputs=("angle",), kp=2.0, ki=3.0, **sampling)
+    return msgspec.structs.replace(scene, hinges=tuple(hinges), sensors=sensors, controllers=(law,))

@@ -125,6 +125,7 @@ def catalogue() -> dict[str, Scene]:
         "closures": with_changes(closed, fm.Change(path=f"bodies.{closed.bodies[0].name}.mass_kg", value=1.7)),
         "couplings": with_changes(geared.scene(), fm.Change(path="in.rotation.torque_Nm.value", value=5.0)),
         "sampled controllers": with_changes(sampled, fm.Change(path="servo.kp", value=4.0)),
+        "controlled closures": controlled.driven_four_bar(period_s=0.05, delay_s=0.01),
         "hinges": with_changes(trees.random_scene(3, replace(trees.ARMED_RIGID, bodies=12)),
                                fm.Change(path="gravity_m_s2.0", value=1.0)),
         "bodies": trees.random_scene(1, replace(trees.FULL, bodies=4)),
@@ -230,7 +231,7 @@ def _doubt(halving: np.ndarray, noise: np.ndarray, step: float) -> np.ndarray:
 pytestmark = pytest.mark.filterwarnings("ignore::flexmb.SceneWarning")  # of what random scenes are like
 
 
-@pytest.mark.parametrize("name", ["controllers", "connectors and events"])
+@pytest.mark.parametrize("name", ["controllers", "connectors and events", "controlled closures"])
 def test_some_numbers_agree_with_differences(name):
     """Those of changes, of the initial state of a controller, and every fortieth."""
     scene = catalogue()[name]

@@ -14,6 +14,7 @@ from flexmb.ready import scenes
 from flexmb.sensitivity.adjoint import arc, part
 from flexmb.sensitivity.adjoint.sampling import SampledLoop
 from tests.flexmb.closure import mechanisms
+from tests.flexmb.control.scenes import driven_four_bar
 from tests.flexmb.sensitivity.differences import TIGHT
 from tests.flexmb.sensitivity.test_sensitivities import EVENTS, NUMBERS, arm
 from tests.repo.project import ROOT
@@ -192,6 +193,14 @@ def test_sampled_controllers_agree_with_forward_sensitivities(delay):
     assert disagreement(scene, 1.0, CONTROLLED, SIGNALS[:3]) < 1e-10
     assert disagreement(scene, 0.97, CONTROLLED, SIGNALS) < 1e-10
     assert disagreement(scene, 0.97, CONTROLLED, ["work"]) < 1e-10
+
+
+def test_a_controlled_closed_chain_agrees_with_forward_sensitivities():
+    """At an instant, and between two; the loads of closures follow what is driven."""
+    scene = driven_four_bar(period_s=0.05, delay_s=0.02)
+    by = ["crank.mass_kg", "coupler.com_m.0", "servo.kp", "drive.rotation.torque_Nm.gain"]
+    for t_end in (0.3, 0.33):
+        assert disagreement(scene, t_end, by, ["drive.rotation", "pivot.rotation.rate"]) < 1e-9
 
 
 def test_events_between_the_instants_of_controllers():

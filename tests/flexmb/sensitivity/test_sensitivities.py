@@ -10,6 +10,7 @@ import flexmb as fm
 from flexmb.ready import scenes
 from flexmb.sensitivity import jump
 from flexmb.sensitivity.impulses import Striking
+from tests.flexmb.control.scenes import driven_four_bar
 from tests.flexmb.sensitivity.differences import differences, outputs, relative_error
 from tests.repo.project import ROOT
 
@@ -201,6 +202,26 @@ def test_a_four_bar_agrees_with_differences():
         "energy.total",
     ]
     agrees(scene, 0.4, by, of, step=3e-4, tolerance=1e-6)
+
+
+@pytest.mark.filterwarnings("ignore:.*the closures do not allow these values")  # of the runs with other numbers
+@pytest.mark.parametrize("sampling", [{}, {"period_s": 0.05, "delay_s": 0.02}], ids=["continuous", "sampled"])
+def test_a_controlled_four_bar_agrees_with_differences(sampling):
+    """The loads of its closure follow what the controller drives."""
+    by = ["crank.mass_kg", "coupler.com_m.0", "servo.kp", "drive.rotation.torque_Nm.gain"]
+    of = ["drive.rotation", "pivot.rotation.rate", "loop.force.x", "signal.servo[0]"]
+    agrees(driven_four_bar(**sampling), 0.33, by, of, step=3e-4, tolerance=1e-6)
+
+
+def test_a_chain_without_its_drives_would_not_agree(monkeypatch):
+    """Negative control: the loads of closures as they are without what controllers drive."""
+    from flexmb.sensitivity import blocks
+
+    real = blocks.chain.ChainBlock
+    alone = np.zeros(0, np.int64)
+    monkeypatch.setattr(blocks.chain, "ChainBlock", lambda **tables: real(**(tables | {"driven": alone})))
+    with pytest.raises(AssertionError):
+        agrees(driven_four_bar(), 0.33, ["crank.mass_kg"], ["drive.rotation"], step=3e-4, tolerance=1e-3)
 
 
 def test_an_event_on_a_load_agrees_with_differences():
