@@ -204,7 +204,7 @@ def _time(
     if abs(rate) * GRAZING * length <= atol + rtol * abs(event.level):
         raise EventError(
             f'event "{event.name}" at t = {t:g} s grazes its level: the quantity reaches it at {rate:.1e} per second, '
-            f"too slowly for its time to have a derivative at rtol {rtol:g}: take a smaller rtol, or change the level or "
-            "the motion"
+            f"too slowly for its time to have a derivative at rtol {rtol:g}: take a smaller rtol, or change the level "
+            "or the motion"
         )
     return (level - change) / rate

@@ -6,6 +6,7 @@ from itertools import islice, product
 
 import pytest
 
+import flexmb as fm
 from tests.repo import abilities
 
 
@@ -39,3 +40,24 @@ def test_what_is_refused_otherwise_is_seen(monkeypatch: pytest.MonkeyPatch) -> N
 
     monkeypatch.setitem(abilities.ABILITIES, "`linearize`", refused)
     assert row("`linearize`")["rigid"] != abilities.tried("`linearize`", "rigid") == "not here: take another"
+
+
+@pytest.mark.parametrize("name", abilities.kinds())
+def test_derivatives_that_are_given_are_right(name: str) -> None:
+    """Forwards and backwards, against differences of runs."""
+    kind, runs = abilities.kinds()[name], {"rtol": 1e-11, "atol": 1e-13}
+    [mass] = [body.mass_kg for body in kind.scene.bodies if kind.number == f"{body.name}.mass_kg"]
+
+    def end(value: float) -> float:
+        run = fm.simulate(kind.scene.with_values({kind.number: value}), kind.t_end, samples=3, **runs)
+        return float(run.markers["asked"].position[-1, 0])
+
+    step = 1e-3 * mass
+    true = (end(mass + step) - end(mass - step)) / (2.0 * step)
+    close = 1e-5 * abs(true) + 1e-10
+    if row("`sensitivities`")[name] == abilities.YES:
+        found = fm.sensitivities(kind.scene, kind.t_end, [kind.number], [abilities.OUTPUT], samples=3, **runs)
+        assert abs(found.derivatives[-1, 0, 0] - true) <= close
+    if row("`gradient`")[name] == abilities.YES:
+        found = fm.gradient(kind.scene, kind.t_end, [kind.number], fm.FinalValue(abilities.OUTPUT), **runs)
+        assert abs(found.derivatives[0] - true) <= close
