@@ -18,6 +18,7 @@ import flexmb as fm
 from flexmb.export.refusals import refuse
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.scene.bodies import BeamBody
+from flexmb.scene.tree import GROUND
 from tests.flexmb.run.every_kind import scenes
 from tests.repo.project import ROOT
 
@@ -98,6 +99,12 @@ def _data(kind: Kind) -> dict[str, object]:
     return {"t": run.t, "asked.position.x": run.markers["asked"].position[:, 0]}
 
 
+def _rests_on_ground(kind: Kind) -> object:
+    if not any(hinge.parent == GROUND for hinge in kind.scene.hinges):
+        raise Absent
+    return fm.base_excitation(kind.scene)
+
+
 OUTPUT = "asked.position.x"
 ABILITIES: dict[str, Callable[[Kind], object]] = {
     **{f"`simulate`, {method}": lambda kind, method=method: _run(kind, method) for method in INTEGRATORS},
@@ -113,6 +120,7 @@ ABILITIES: dict[str, Callable[[Kind], object]] = {
     "files of runs and scenes": _files,
     "`equilibrium`": lambda kind: fm.equilibrium(kind.scene),
     "`linearize`": lambda kind: fm.linearize(kind.scene),
+    "`base_excitation`": _rests_on_ground,
     "`acceleration_derivatives`": lambda kind: _of_state(kind, "acceleration_derivatives"),
     "`evaluation_derivatives`": lambda kind: _of_state(kind, "evaluation_derivatives"),
     "`sensitivities`": lambda kind: fm.sensitivities(
