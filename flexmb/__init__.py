@@ -25,9 +25,13 @@ _HOME = {
     "flexmb.linear.equilibrium_path": "CriticalPoint EquilibriumPath equilibrium_path",
     "flexmb.linear.linear_model": "LinearModel",
     "flexmb.linear.linearize": "linearize",
+    "flexmb.linear.linearize_sampled": "linearize_sampled",
+    "flexmb.linear.margins": "LoopTransfer",
     "flexmb.linear.newton": "EquilibriumError",
     "flexmb.linear.random_response": "RandomResponse SpectralDensity random_response",
+    "flexmb.linear.sampled_model": "SampledModel",
     "flexmb.linear.spin": "steady_spin SteadySpin",
+    "flexmb.linear.stability_map": "MultiplierMap stability_map",
     "flexmb.run.batch_trajectory": "BatchTrajectory",
     "flexmb.run.envelope": "Envelope Extremes",
     "flexmb.run.event_record": "EventRecord",
@@ -81,12 +85,17 @@ if TYPE_CHECKING:  # the same names for type checkers and editors, which do not 
     from flexmb.linear.equilibrium_path import equilibrium_path as equilibrium_path
     from flexmb.linear.linear_model import LinearModel as LinearModel
     from flexmb.linear.linearize import linearize as linearize
+    from flexmb.linear.linearize_sampled import linearize_sampled as linearize_sampled
+    from flexmb.linear.margins import LoopTransfer as LoopTransfer
     from flexmb.linear.newton import EquilibriumError as EquilibriumError
     from flexmb.linear.random_response import RandomResponse as RandomResponse
     from flexmb.linear.random_response import SpectralDensity as SpectralDensity
     from flexmb.linear.random_response import random_response as random_response
+    from flexmb.linear.sampled_model import SampledModel as SampledModel
     from flexmb.linear.spin import SteadySpin as SteadySpin
     from flexmb.linear.spin import steady_spin as steady_spin
+    from flexmb.linear.stability_map import MultiplierMap as MultiplierMap
+    from flexmb.linear.stability_map import stability_map as stability_map
     from flexmb.run.batch_trajectory import BatchTrajectory as BatchTrajectory
     from flexmb.run.envelope import Envelope as Envelope
     from flexmb.run.envelope import Extremes as Extremes

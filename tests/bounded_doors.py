@@ -133,6 +133,7 @@ def functions() -> dict[str, Door]:
         "advise.budget": Door(lambda n: fm.advise(scene, 1e-2, t_end=0.1, budget=n), (*huge, -1, 0)),
         "advise.t_end": Door(lambda n: fm.advise(scene, 1e-2, t_end=n), huge),
         "steady_spin.rate": Door(lambda n: fm.steady_spin(scene, "pivot", n), (*huge, -1, 0)),
+        "linearize_sampled.period": Door(lambda n: fm.linearize_sampled(scene, n), huge),
         "campbell.rates": Door(lambda n: fm.campbell(scene, "pivot", [n]), (*huge, -1, 0)),
         "check_scene.t_end": Door(lambda n: fm.check_scene(scene, t_end=n), huge),
         "SceneBuilder.scene.t_end": Door(lambda n: builder.scene(t_end=n), huge),

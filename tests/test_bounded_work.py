@@ -95,6 +95,10 @@ TOO_LARGE: dict[str, list[tuple[Callable[[fm.Scene], object], str]]] = {
     "advise": [(lambda scene: fm.advise(scene, 1e-2, "energy.total"), FEWER)],
     "linearize": [(fm.linearize, DENSE)],
     "base_excitation": [(fm.base_excitation, DENSE)],
+    "linearize_sampled": [(fm.linearize_sampled, DENSE)],
+    "stability_map": [
+        (lambda scene: fm.stability_map(scene, {"a.mass_kg": [1.0], "i.rotation.angle_rad": [0.0]}), DENSE)
+    ],
     "equilibrium": [(fm.equilibrium, DENSE)],
     "equilibrium_path": [(lambda scene: fm.equilibrium_path(scene, "a.mass_kg", [1.0, 2.0]), DENSE)],
     "steady_spin": [(lambda scene: fm.steady_spin(scene, "i", 1.0), DENSE)],

@@ -31,6 +31,15 @@ def linearize(
         bool,
         typer.Option("--truncation/--no-truncation", help="Linearise again with twice the modes of every beam."),
     ] = True,
+    sampled: Annotated[
+        bool, typer.Option("--sampled", help="Scenes with sampled controllers: multipliers over a period, and margins.")
+    ] = False,
+    picture: Annotated[
+        Path | None, typer.Option(help="With --sampled: Bode and Nyquist diagrams, a file.", show_default=False)
+    ] = None,
+    loop: Annotated[
+        str | None, typer.Option(help="Signal at which the loop of the picture is opened.", show_default=False)
+    ] = None,
     export: Annotated[
         Path | None, typer.Option(help="File of matrices, names and eigenvalues: .npz or .mat.", show_default=False)
     ] = None,
@@ -47,6 +56,11 @@ def linearize(
         flexmb linearize arm.toml
         flexmb linearize gyrostat.toml --at initial --export gyrostat.npz
         flexmb linearize rotor.toml --spin shaft --rate 30
+        flexmb linearize satellite.toml --sampled --picture loop.png
+
+    **Sampled** controllers act at instants: with `--sampled` the model is exact over the period after which all repeat.
+    Its multipliers are printed with gain, phase and delay margins of every loop, opened at outputs of controllers and
+    at sensors.
 
     **Truncation** is the relative change of each eigenvalue when every beam has twice its modes, an estimate of the
     truncation error. Motions without stiffness are listed as rigid-body motions.
@@ -61,6 +75,11 @@ def linearize(
 
         if at not in ("equilibrium", "initial"):
             raise ValueError(f"--at is equilibrium or initial, not {at!r}")
+        if sampled:
+            _show_sampled(scene, at, spin, picture, loop, export)
+            return
+        if picture is not None or loop is not None:
+            raise ValueError("--picture and --loop are of sampled loops: add --sampled")
         with console.status(Text(f"linearising {scene} (the first time after an update compiles)")):
             model, missing, note = _linearised(scene, at, spin, rate, cut)
         console.print(modes_table(model, missing))
@@ -68,6 +87,29 @@ def linearize(
             console.print(Text(printable(note), style="yellow"))
         if export is not None:
             console.print("wrote", str(model.save(export)), soft_wrap=True)
+
+
+def _show_sampled(
+    scene: Path, at: str, spin: str | None, picture: Path | None, loop: str | None, export: Path | None
+) -> None:
+    """Print the model of a sampled loop, and write its files."""
+    from flexmb.linear.equations import built
+    from flexmb.linear.linear_tables import sampled_table
+    from flexmb.linear.linearize_sampled import linearize_sampled
+    from flexmb.scene.files import load_scene
+
+    if spin is not None:
+        raise ValueError("--spin and --sampled exclude each other: steady spins are of scenes without controllers")
+    if picture is not None:
+        check_folder(picture.parent)
+    with console.status(Text(f"linearising {scene} (the first time after an update compiles)")):
+        system = built(load_scene(scene))
+        model = linearize_sampled(system, state=None if at == "equilibrium" else system.initial_state)
+    console.print(sampled_table(model))
+    written = [] if export is None else [model.save(export)]
+    written += [] if picture is None else [model.plot(picture, loop)]
+    if written:
+        console.print("wrote", ", ".join(str(path) for path in written), soft_wrap=True)
 
 
 def _linearised(

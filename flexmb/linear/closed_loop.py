@@ -34,7 +34,7 @@ from flexmb.typing import Real
 
 LARGE = 2.0**20
 """Change of a drive, whose effect is linear: large, so that the rounding of other loads is negligible."""
-REMEDY = "linearise flexmb.open_loop(scene), and close the loop on that model"
+REMEDY = "flexmb.linearize_sampled(scene) gives the discrete one; or linearise flexmb.open_loop(scene)"
 
 
 class Chained(NamedTuple):

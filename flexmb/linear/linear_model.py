@@ -235,34 +235,22 @@ class LinearModel:
         return StateSpace(self.A, self.B, self.C, self.D)
 
     def to_control(self) -> Any:
-        """As a named `control.StateSpace`; ImportError where python-control is not installed."""
+        """As a named `control.StateSpace`, with ":" for "." in names of inputs and outputs, where it allows none.
+
+        ImportError where python-control is not installed.
+        """
         try:
             import control
         except ImportError:
             raise ImportError("python-control is not installed: pip install control, or use to_scipy()") from None
         self._refuse_torn()
-        names = {key: [name for name, _ in getattr(self, key)] for key in ("states", "inputs", "outputs")}
-        return control.ss(self.A, self.B, self.C, self.D, **names)
+        return control.ss(self.A, self.B, self.C, self.D, **control_names(self.states, self.inputs, self.outputs))
 
     def save(self, path: Path | str) -> Path:
         """Matrices, names, units and eigenvalues as `.npz` or `.mat`; ValueError for another ending."""
         self._refuse_torn()
-        path = Path(path)
         data: dict[str, Any] = {key: getattr(self, key) for key in ("A", "B", "C", "D", "mass", "eigenvalues")}
-        for key in ("states", "inputs", "outputs"):
-            data[key] = np.array([f"{name} [{unit}]" for name, unit in getattr(self, key)], dtype=np.str_)
-        if path.suffix not in (".npz", ".mat"):
-            raise ValueError(f"{path}: linear models are written as .npz or .mat")
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with whole_file(path) as beside:
-            if path.suffix == ".npz":
-                np.savez(beside, **data)
-            else:
-                from scipy.io import savemat
-
-                cells = {key: value.astype(object) for key, value in data.items() if value.dtype.kind == "U"}
-                savemat(beside, data | cells)
-        return path
+        return save_matrices(path, data, {key: getattr(self, key) for key in ("states", "inputs", "outputs")})
 
     def _shape(self, mode: Mode) -> Complex:
         if not isinstance(mode, Mode):
@@ -277,19 +265,53 @@ class LinearModel:
 
     @kept
     def _decomposition(self) -> tuple[Complex, Complex, Real]:
-        """Eigenvalues by modulus, right eigenvectors, and bounds n u |A| / |y'x| of the changes from rounding of A.
-
-        A is first balanced by powers of two, hence without rounding, because its entries differ by squares of
-        frequencies.
-        """
+        """See `decomposed`, by modulus."""
         self._refuse_torn()
-        balanced, (scale, _) = matrix_balance(self.A, permute=False, separate=1)
-        values, left, right = eig(balanced, left=True, right=True)
-        overlap = np.abs(np.sum(left.conj() * right, axis=0))
-        size = len(values) * ROUNDOFF * np.linalg.norm(balanced, 2)
-        tolerance = size / np.maximum(overlap, np.sqrt(ROUNDOFF))
+        values, vectors, tolerances = decomposed(self.A)
         order = np.lexsort((-values.imag, np.abs(values)))
-        return values[order], (scale[:, None] * right)[:, order], tolerance[order]
+        return values[order], vectors[:, order], tolerances[order]
+
+
+def decomposed(A: Real) -> tuple[Complex, Complex, Real]:
+    """Eigenvalues (n,), right eigenvectors (n,n), and bounds n u |A| / |y'x| (n,) of their changes from rounding of A.
+
+    A is first balanced by powers of two, hence without rounding, because its entries differ by squares of frequencies.
+    """
+    balanced, (scale, _) = matrix_balance(A, permute=False, separate=1)
+    values, left, right = eig(balanced, left=True, right=True)
+    overlap = np.abs(np.sum(left.conj() * right, axis=0))
+    size = len(values) * ROUNDOFF * np.linalg.norm(balanced, 2)
+    return values, scale[:, None] * right, size / np.maximum(overlap, np.sqrt(ROUNDOFF))
+
+
+Names = tuple[tuple[str, str], ...]
+"""With units."""
+
+
+def control_names(states: Names, inputs: Names, outputs: Names) -> dict[str, list[str]]:
+    """Names as python-control takes them: without dots, but for those of states."""
+    found = {"states": [name for name, _ in states]}
+    return found | {
+        key: [name.replace(".", ":") for name, _ in names] for key, names in (("inputs", inputs), ("outputs", outputs))
+    }
+
+
+def save_matrices(path: Path | str, data: dict[str, Any], named: dict[str, Names]) -> Path:
+    """Write arrays, and names with units, as `.npz` or `.mat`; ValueError for another ending."""
+    path = Path(path)
+    data |= {key: np.array([f"{name} [{unit}]" for name, unit in names], dtype=np.str_) for key, names in named.items()}
+    if path.suffix not in (".npz", ".mat"):
+        raise ValueError(f"{path}: linear models are written as .npz or .mat")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with whole_file(path) as beside:
+        if path.suffix == ".npz":
+            np.savez(beside, **data)
+        else:
+            from scipy.io import savemat
+
+            cells = {key: value.astype(object) for key, value in data.items() if value.dtype.kind == "U"}
+            savemat(beside, data | cells)
+    return path
 
 
 def modal_assurance(mass: Real, one: Complex, other: Complex) -> Real:

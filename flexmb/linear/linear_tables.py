@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
@@ -13,6 +15,10 @@ from flexmb.linear.random_response import RandomResponse
 from flexmb.linear.truncation import Truncation
 from flexmb.output.listing import Listing, figures, names, prose
 from flexmb.typing import Real
+
+if TYPE_CHECKING:  # of sampled loops alone
+    from flexmb.linear.margins import LoopTransfer
+    from flexmb.linear.sampled_model import SampledModel
 
 _COLOURS = {"asymptotically stable": "green", "neutral": "yellow", "unstable": "bold red"}
 _DOMINANT = 3  # displacements named per mode
@@ -131,3 +137,49 @@ def random_table(response: RandomResponse) -> RenderableType:
         cells = ("undetermined", unit, "") if np.isnan(rms) else (f"{rms:.5g}", unit, f"{response.crossings_hz[i]:.4g}")
         table.add(name, *cells)
     return table
+
+
+def sampled_table(model: SampledModel) -> RenderableType:
+    """Multipliers of a sampled loop with frequency and damping, the margins of every loop, and the verdict."""
+    title = f"\nMultipliers of {model.scene} over {model.period:g} s"
+    caption = "Frequency and damping ratio: of the continuous motion that is sampled so."
+    table = Listing(*figures("size", "Hz", "damping ratio"), *prose("dominant displacement or state"), title=title,
+                    caption=caption)  # fmt: skip
+    for mode in model.modes:
+        size = abs(mode.multiplier)
+        style = "bold red" if size - mode.tolerance > 1.0 else ""
+        ratio = "" if np.isnan(mode.damping_ratio) else f"{mode.damping_ratio:.3g}"
+        table.add(Text(f"{size:.6g}", style=style), f"{mode.frequency_hz:.6g}", ratio, mode.dominant)
+    verdict = model.stability
+    lines = [Text(str(verdict), style=_COLOURS[verdict.verdict])]
+    if model.free:
+        lines.append(Text(f"drift freely, and are left out: {', '.join(model.free)}"))
+    if model.saturated:
+        lines.append(Text(f"at a limit, where they change nothing: {', '.join(model.saturated)}", style="yellow"))
+    left = float(np.max(np.abs(model.rates), initial=0.0))
+    if left > 1e-6:
+        lines.append(Text(f"not an equilibrium: accelerations up to {left:.3g} are left", style="yellow"))
+    return Group(table, *_margins(model), *lines)
+
+
+def _margins(model: SampledModel) -> list[RenderableType]:
+    """A table of all loops that have a transfer function, and a line that names the others."""
+    caption = "Each loop opened alone. They tell how far a stable loop is from an unstable one."
+    names = ("gain", "least gain", "phase (degrees)", "at rad/s", "delay (s)")
+    table = Listing(*prose("opened at"), *figures(*names), title="Margins", caption=caption)
+    others = list[str]()
+    for name in model.loop_names:
+        try:
+            table.add(name, *_of_loop(model.opened(name)))
+        except ValueError:
+            others.append(name)
+    told = Text(f"sampled more than once in {model.period:g} s, of no one transfer function: {', '.join(others)}")
+    return [*([table] if len(others) < len(model.loop_names) else []), *([told] if others else [])]
+
+
+def _of_loop(loop: LoopTransfer) -> list[str]:
+    nearest = min(loop.gain_crossings, key=lambda each: abs(each.value), default=None)
+    return [
+        f"{loop.gain_margin:.4g}", f"{loop.gain_reduction:.4g}", f"{np.degrees(loop.phase_margin):.4g}",
+        "" if nearest is None else f"{nearest.omega:.4g}", f"{loop.delay_margin:.4g}",
+    ]  # fmt: skip

@@ -20,6 +20,7 @@ from flexmb.linear.campbell import campbell
 from flexmb.linear.controlled_motion import ControlledMotion
 from flexmb.linear.equilibrium import equilibrium
 from flexmb.linear.linearize import linearize
+from flexmb.linear.linearize_sampled import linearize_sampled
 from flexmb.linear.spin import steady_spin
 from flexmb.ready import scenes
 from flexmb.run.simulate import simulate
@@ -146,6 +147,8 @@ def _linear_models() -> None:
 def _controlled_linear_models() -> None:
     linearize(scenes.with_feedback(scenes.pendulum()))
     linearize(scenes.with_feedback(scenes.looped()))
+    sampled = compile(scenes.with_feedback(scenes.pendulum(), period=4e-4, delay=1e-4))
+    linearize_sampled(sampled, state=sampled.initial_state)
     for builder in (scenes.pendulum, scenes.looped):
         controlled = scenes.with_feedback(builder())
         ControlledMotion(controlled).evaluation_derivatives(compile(controlled).initial_state)

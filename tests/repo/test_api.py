@@ -16,6 +16,7 @@ FUNCTIONS = {
     "equilibrium_path": ["scene", "number", "values"], "steady_spin": ["system", "hinge", "rate"],
     "base_excitation": ["system", "state", "held"], "campbell": ["system", "hinge", "rates"],
     "advise": ["scene", "tolerance", "quantity", "t_end"], "random_response": ["model", "densities", "outputs"],
+    "linearize_sampled": ["system", "period", "state", "held"], "stability_map": ["scene", "values"],
     "simulate": ["scene", "t_end", "method", "rtol", "atol", "algorithm"],
     "simulate_batch": ["copies", "t_end", "method", "q", "u", "threads", "rtol"], "compile_batch": ["scenes"],
 }  # fmt: skip

@@ -41,7 +41,8 @@ NO_MAPPING = chosen("x", 5, [], [1.0], np.zeros(2), {"nobody": 1.0}, {"elbow"})
 
 def of_objects(w: World) -> Calls:
     """Of all of them."""
-    return Calls(_of_algorithms(w) | _of_parameters(w) | _of_linear_models(w) | _of_controlled(w) | _of_runs(w))
+    linear = _of_linear_models(w) | _of_sampled_loops(w)
+    return Calls(_of_algorithms(w) | _of_parameters(w) | linear | _of_controlled(w) | _of_runs(w))
 
 
 def _of_algorithms(w: World) -> Calls:
@@ -171,6 +172,31 @@ def _of_random_vibration(found: Calls) -> None:
               frequencies_hz=series)  # fmt: skip
     found.add("RandomResponse.plot", lambda: written(response.plot, "response.png"))
     found.add("RandomResponse.to_csv", lambda: written(response.to_csv, "response.csv"))
+
+
+def _of_sampled_loops(w: World) -> Calls:
+    """Models over a period, the loops that they open, and maps of stability."""
+    tree, state, found = w.tree, w.state, Calls()
+    found.add("linearize_sampled", fm.linearize_sampled, {"system": tree, "period": 0.5, "state": state},
+              lambda it: it.A, system=systems, period=numbers, state=but_none(states))  # fmt: skip
+    law = fm.StateSpace(name="law", inputs=("angle", "rate"), D=((-3.0, -4.0),), period_s=0.25, delay_s=0.125)
+    scene = rotor(law)
+    model = fm.linearize_sampled(scene)
+    loop, values = model.opened("law"), {"law.delay_s": np.array([0.0, 0.125]), "law.period_s": np.array([0.25])}
+    found.add("SampledModel, attributes", lambda: attributes(model))
+    found.add("SampledModel.opened", model.opened, {"signal": "law"}, lambda it: it.A, signal=names)
+    found.add("SampledModel.to_control", installed(model.to_control), {},
+              lambda it: it if isinstance(it, str) else (it.A, it.B, it.C, it.D))  # fmt: skip
+    found.add("SampledModel.save", lambda: written(model.save, "model.npz"))
+    found.add("LoopTransfer, attributes", lambda: (loop.grid, loop.gain_crossings, loop.gain_margin))
+    found.add("LoopTransfer, called", loop, {"omega": np.array([2.0, 3.0])}, omega=series)
+    asked = {"scene": scene, "values": values}
+    found.add("stability_map", fm.stability_map, asked, lambda it: it.size,
+              scene=chosen(None, "scene.toml", 1, fm.System, tree), values=NO_MAPPING)  # fmt: skip
+    diagram = fm.stability_map(**asked)
+    found.add("MultiplierMap, attributes", lambda: (diagram.size, diagram.stable))
+    found.add("MultiplierMap.to_csv", lambda: written(diagram.to_csv, "map.csv"))
+    return found
 
 
 def _of_controlled(w: World) -> Calls:

@@ -28,7 +28,8 @@ UNTRIED = {  # what users may ask all the same: docs/threads.md
     "NestedSystem.workspace": "makes a new workspace, which is for one thread",
     "Parameters.workspace": "makes a new workspace, which is for one thread",
     "Trajectory.plot": "draws by matplotlib, whose figures are for one thread",
-    "Campbell.plot": "draws by matplotlib, whose figures are for one thread",
+    **{f"{each}.plot": "draws by matplotlib, whose figures are for one thread"
+       for each in ("Campbell", "SampledModel", "MultiplierMap")},
     "Trajectory.to_rerun": "writes by the library rerun",
 }  # fmt: skip
 EXEMPT = {
@@ -44,6 +45,7 @@ EXEMPT = {
     "FinalValue", "Misfit", "TimeIntegral",  # data, checked by the call of `gradient` and in tests of it
     "Advice", "Campbell", "Evaluation", "LinearModel", "SteadySpin", "System", "Trajectory", "Status",  # results
     "BatchTrajectory", "CriticalPoint", "Envelope", "Equilibrium", "EquilibriumPath", "Extremes",  # results
+    "LoopTransfer", "SampledModel", "MultiplierMap",  # results
     "ClosureError", "DynamicsError", "EquilibriumError", "EventError", "Interrupted",
     "NotDifferentiableError", "PrecisionWarning", "SceneError", "SceneWarning",
 }  # fmt: skip
@@ -53,6 +55,7 @@ INNER = {  # classes of the mechanics and of runs, which users meet only behind 
     "BodyLink", "FlexibleNode", "HingeKind", "Models", "Observation", "Settings", "Integrator",
     "Steady", "_Differentiation",  # of parameters
     "Equations", "ClosedEquations", "Pushforward",  # of what derivatives are taken of
+    "LiftedLoop",  # of a sampled model, which opens it
     "RunMethod",  # of the advisor's
     "FinalValue",  # data
     "Restart",  # its files: tests/flexmb/run/test_restart.py
