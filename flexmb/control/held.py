@@ -95,9 +95,11 @@ def resting_alike(scene: Scene) -> Scene:
     lags, which rest at what they follow. NotImplementedError for a sampled law of a user with states, whose next values
     are known only to it.
     """
-    at_once = {sensor.name: sensor_width(scene, sensor) or 1 for sensor in scene.sensors if depends_at_once(sensor)}
-    lags = tuple(_lag(name, width) for name, width in at_once.items())
-    controllers = (_continuous(controller, set(at_once)) for controller in scene.controllers)
+    sampled = [controller for controller in scene.controllers if controller.period_s is not None]
+    read = {reference.partition("[")[0] for controller in sampled for reference in controller.inputs}
+    at_once = [sensor for sensor in scene.sensors if sensor.name in read and depends_at_once(sensor)]
+    lags = tuple(_lag(sensor.name, sensor_width(scene, sensor) or 1) for sensor in at_once)
+    controllers = (_continuous(each, {sensor.name for sensor in at_once}) for each in scene.controllers)
     return msgspec.structs.replace(scene, controllers=(*lags, *controllers), events=())
 
 

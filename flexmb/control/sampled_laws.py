@@ -19,6 +19,7 @@ from flexmb.control.laws import BEGUN, FILTERED
 from flexmb.control.sampling import sample
 from flexmb.control.tables import Loop
 from flexmb.scene.control import Controller, GainTable, Pid, Saturation, StateSpace, UserLaw
+from flexmb.system.kinks import NotDifferentiableError
 from flexmb.typing import Index, Real, Record
 
 ATTEMPTS = 64
@@ -57,7 +58,7 @@ def sampled_laws(feedback: Feedback, t: float, y: Real, states: Mapping[str, Rea
     """At y = [q, u, x, work] (n,) of a run that has begun. states: those of sampled controllers by name; one that is
     not there has its initial states, after one sample: it has no difference of errors.
 
-    `NotDifferentiableError` where a law has a corner, NotImplementedError where outputs do not settle.
+    `NotDifferentiableError` where a law has a corner or no value, NotImplementedError where outputs do not settle.
     """
     _settle(feedback, t, y, states)
     refuse_corners(feedback, sampled=True)
@@ -129,8 +130,9 @@ def _settle(feedback: Feedback, t: float, y: Real, states: Mapping[str, Real]) -
     for _, row, controller in sampled:
         if controller.name in states:
             made.state[row["state"] : row["state"] + row["states"]] = states[controller.name]
+    outputs = np.concatenate([np.zeros(0, np.int64), *(_signals(row) for _, row, _ in sampled)])
     for _ in range(ATTEMPTS):
-        before = made.signal.copy()
+        before = made.signal[outputs]
         raise_status(feedback, loop.look(t, y, made.signal.copy(), made))
         for i, row, controller in sampled:
             if isinstance(controller, Pid):
@@ -139,8 +141,15 @@ def _settle(feedback: Feedback, t: float, y: Real, states: Mapping[str, Real]) -
             if isinstance(controller, Pid):
                 made.state[row["state"] + FILTERED] = _error(controller, row, made)
                 made.state[row["state"] + BEGUN] = 1.0
-            made.signal[_signals(row)] = made.output[row["output"] : row["output"] + row["outputs"]]
-        if np.all(np.abs(made.signal - before) <= SETTLED * (np.abs(made.signal) + np.abs(before))):
+            given = made.output[row["output"] : row["output"] + row["outputs"]]
+            if not np.isfinite(given).all():
+                raise NotDifferentiableError(
+                    f'controller "{controller.name}" puts out no number at this state: it may read a load that the '
+                    "motion does not determine, because closures are redundant: let it read another one"
+                )
+            made.signal[_signals(row)] = given
+        now = made.signal[outputs]
+        if np.all(np.abs(now - before) <= SETTLED * (np.abs(now) + np.abs(before))):
             return
     raise NotImplementedError(
         "sampled controllers read accelerations or loads that they change themselves, and their outputs do not settle "

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import SymLogNorm
 from matplotlib.figure import Figure
 
 from flexmb.linear.margins import LoopTransfer
@@ -16,7 +17,7 @@ from flexmb.typing import Real
 _SIZE = (10.0, 8.0)  # inches
 _RESOLUTION = 120  # dots per inch
 _REACH = 3.0  # of Nyquist's diagram about the origin
-_SHADES = 0.5  # sizes of multipliers from 1 by this to either side are told apart
+_NEAREST = 1e-4  # distance of a multiplier's size from 1, up to which shades are linear; beyond they are logarithmic
 
 
 def write_loop_plot(path: Path, scene: str, loop: LoopTransfer) -> Path:
@@ -63,10 +64,9 @@ def write_map_plot(path: Path, scene: str, names: tuple[str, str], first: Real, 
     x, y = np.argsort(first), np.argsort(second)
     shown = size[np.ix_(x, y)].T
     if len(first) > 1 and len(second) > 1:
-        mesh = axes.pcolormesh(
-            first[x], second[y], shown, cmap="RdBu_r", vmin=1.0 - _SHADES, vmax=1.0 + _SHADES, shading="nearest"
-        )
-        figure.colorbar(mesh, label="size of the largest multiplier")
+        shades = SymLogNorm(_NEAREST, vmin=-1.0, vmax=1.0)
+        mesh = axes.pcolormesh(first[x], second[y], shown - 1.0, cmap="RdBu_r", norm=shades, shading="nearest")
+        figure.colorbar(mesh, label="size of the largest multiplier, less 1: red is unstable")
         if np.nanmin(shown) < 1.0 < np.nanmax(shown):
             axes.contour(first[x], second[y], shown, levels=[1.0], colors="black")
     else:

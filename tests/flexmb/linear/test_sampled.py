@@ -372,14 +372,17 @@ def test_a_map_is_stable_within_the_closed_form(tmp_path: Path) -> None:
     assert line.plot(tmp_path / "line.png").stat().st_size > 1000
 
 
-def test_a_map_has_gaps_where_the_loop_does_not_rest() -> None:
-    law = fm.Pid(name="law", inputs=("angle",), kp=9.0, setpoint=0.0, lower=-0.5, upper=0.5, period_s=0.02)
-    scene = pendulum(law, torque=fm.ControlSignal(source="law"), stiffness=20.0).scene()
-    found = fm.stability_map(scene, {"law.kp": [4.0, 0.0], "law.setpoint": [np.pi / 2.0, 0.5 / 4.0 + np.pi / 2.0]})
-    assert found.size.shape == (2, 2)
-    for where, why in found.refused.items():
-        assert np.isnan(found.size[where]) and why
-    assert np.isfinite(found.size).any()
+def test_a_map_has_gaps_where_there_is_no_linear_model() -> None:
+    """A limit that is exactly where the loop rests; where all pairs are gaps, the reason is raised."""
+    scene = rotor(
+        fm.Pid(name="law", inputs=("angle",), kp=3.0, kd=4.0, filter_s=0.1, lower=-1.0, upper=1.0, period_s=0.1)
+    )  # fmt: skip
+    found = fm.stability_map(scene, {"law.kp": [2.0, 3.0], "law.upper": [0.0, 1.0]})
+    assert set(found.refused) == {(0, 0), (1, 0)} and "exactly at a limit" in found.refused[0, 0]
+    assert np.isnan(found.size[:, 0]).all() and not found.stable[:, 0].any()
+    assert found.size[1, 1] == abs(fm.linearize_sampled(scene).multipliers[0])
+    with pytest.raises(fm.NotDifferentiableError, match="exactly at a limit"):
+        fm.stability_map(scene, {"law.kp": [2.0, 3.0], "law.upper": [0.0]})
 
 
 # ---- Refusals
@@ -408,6 +411,11 @@ def by_user(function: str, **more: Any) -> fm.Scene:
     return rotor(fm.UserLaw(name="law", inputs=("angle",), function=address, period_s=T, **more), stiffness=2.0)
 
 
+def kinked() -> fm.Scene:
+    """With the kink where it starts."""
+    return by_user("kinked", parameters=(0.3,))
+
+
 @pytest.mark.parametrize(("ask", "kind", "reason"), [
     (lambda: fm.linearize_sampled(held(period=None)), ValueError, "no controller of the scene is sampled: give"),
     (lambda: fm.linearize_sampled(held(), 0.3), ValueError, "no multiple of 0.2 s.*leave it out"),
@@ -419,6 +427,8 @@ def by_user(function: str, **more: Any) -> fm.Scene:
      "user with states.*a state"),
     (lambda: fm.linearize_sampled(leaning(upper=900.0, tracking_s=1.0)), NotImplementedError,
      '"hold" is continuous, and may rest at a limit.*leave its limits out'),
+    (lambda: fm.linearize_sampled(kinked(), state=fm.compile(kinked()).initial_state), fm.NotDifferentiableError,
+     '"law" has no derivative.*no smooth function'),
     (lambda: fm.linearize_sampled(5), TypeError, "a System or a Scene"),
     (lambda: fm.linearize_sampled(held()).opened("nobody"), KeyError, "no loop goes through.*law, angle"),
     (lambda: fm.linearize_sampled(many().scene()).opened("filter"), ValueError, '"filter": it is sampled 2 times'),
@@ -453,6 +463,20 @@ def test_a_closed_chain_is_its_equation_of_one_coordinate() -> None:
     A, B = np.array([[0.0, 1.0], [-weight * np.sin(angle) / inertia, 0.0]]), np.array([[0.0], [1.0 / inertia]])
     expected = radius(A, B, np.array([[STIFFNESS, DAMPING]]), np.array(0.05), np.array(0.4))
     assert abs(model.multipliers[0]) == pytest.approx(float(expected), rel=1e-9)
+
+
+def test_a_load_that_stays_open_may_be_there_but_not_be_read() -> None:
+    """Of two windows in a row, of which redundant closures leave loads undetermined."""
+    scene = windows(2, SAMPLED)
+    rest = fm.linearize_sampled(scene).state
+    load = fm.LoadSensor(name="load", hinge=scene.constraints[0].name)
+    more = msgspec.structs.replace(scene, sensors=(*scene.sensors, load))
+    model = fm.linearize_sampled(more, state=rest)
+    assert np.isnan(model.C).any(axis=1).sum() >= 1
+    assert np.abs(model.A - fm.linearize_sampled(scene, state=rest).A).max() < 1e-11
+    law = msgspec.structs.replace(SAMPLED, inputs=("angle", "load[0]"), D=((-STIFFNESS, -0.01),))
+    with pytest.raises(fm.NotDifferentiableError, match='"law" puts out no number.*redundant.*read another one'):
+        fm.linearize_sampled(msgspec.structs.replace(more, controllers=(law,)), state=rest)
 
 
 def test_the_command_prints_multipliers_and_margins(tmp_path: Path) -> None:
