@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -10,7 +11,7 @@ from scipy.integrate import solve_ivp
 import flexmb as fm
 from flexmb.control import loop
 from flexmb.control.feedback import Feedback
-from flexmb.control.laws import BEGUN
+from flexmb.control.laws import BEGUN, INTEGRAL
 from flexmb.control.loop_run import FreshStart
 from flexmb.control.schedule import instants
 from flexmb.control.tables import APPLY
@@ -22,10 +23,13 @@ SIZE = 5e-6  # of deviations: what is not linear is its square, and 1e-16 over i
 
 
 class NonlinearPeriod:
-    """Of a scene that rests with all controllers' states and outputs zero, from `start` (s) on; names of states as in a
-    model without rotations of more than one axis."""
+    """Of a scene that rests with all controllers' states and outputs zero, but for PID controllers whose integrals are
+    `integrals`, from `start` (s) on. motion: as of a `LinearModel`."""
 
-    def __init__(self, scene: fm.Scene, model: fm.SampledModel, start: float, motion: Real) -> None:
+    def __init__(
+        self, scene: fm.Scene, model: fm.SampledModel, start: float, motion: Real, integrals: dict[str, float]
+    ) -> None:
+        self._integrals = integrals
         self._system, self._model, self._start, self._motion = fm.compile(scene), model, start, motion
         end = start + model.period
         self._table = instants(scene.controllers, 0.0, end, (start, end))
@@ -55,11 +59,17 @@ class NonlinearPeriod:
         made.following[0] = np.searchsorted(self._table["time"], self._start - 1e-9)
         for row, controller in zip(made.controller, feedback.controllers, strict=True):
             if row["sampled"] and isinstance(controller, fm.Pid):
-                made.state[row["state"] + BEGUN] = 1.0
+                integral = self._integrals.get(controller.name, 0.0)
+                made.state[row["state"] + BEGUN], made.state[row["state"] + INTEGRAL] = 1.0, integral
+                made.signal[row["signal"]] = integral
+                i = [each.name for each in feedback.controllers].index(controller.name)
+                own = (self._table["controller"] == i) & (self._table["kind"] != APPLY)
+                made.held[self._table["row"][own], 0] = integral
         first = system.nq + system.nu
         y[first:-1] = 0.0
         places = {name: self._place(feedback, name) for name in names[2 * n :]}
-        for value, (array, place) in zip(x[2 * n :], places.values(), strict=True):
+        base = np.array([(y if array is None else array)[place] for array, place in places.values()])
+        for value, (array, place) in zip(base + x[2 * n :], places.values(), strict=True):
             (y if array is None else array)[place] = value
         times = np.unique([self._start, *self._table["time"][self._table["time"] >= self._start], end])
         slope = np.empty(len(y))
@@ -74,11 +84,10 @@ class NonlinearPeriod:
             y = solve_ivp(rhs, (begin, stop), y, "DOP853", rtol=3e-14, atol=1e-17).y[:, -1]
         moved = np.linalg.lstsq(self._motion, y[: system.nq] - rest.q, rcond=None)[0]
         last = [self._place(feedback, name, after=True) for name in names[2 * n :]]
-        return np.r_[moved, (y[system.nq : first] - rest.u)[free], [
-            (y if array is None else array)[place] for array, place in last
-        ]]  # fmt: skip
+        now = np.array([(y if array is None else array)[place] for array, place in last])
+        return np.r_[moved, (y[system.nq : first] - rest.u)[free], now - base]
 
-    def _place(self, feedback: Feedback, name: str, after: bool = False) -> tuple[Real | None, object]:
+    def _place(self, feedback: Feedback, name: str, after: bool = False) -> tuple[Real | None, Any]:
         """The array and index of a state of controllers; None for y."""
         made, (law, _, kind) = feedback.running, name.partition(".")
         i = [controller.name for controller in feedback.controllers].index(law)

@@ -139,10 +139,10 @@ def test_without_sampled_controllers_it_holds_the_loads() -> None:
 # ---- The nonlinear loop
 
 
-def differences(scene: fm.Scene, model: fm.SampledModel) -> Real:
+def differences(scene: fm.Scene, model: fm.SampledModel, **integrals: float) -> Real:
     motion = fm.linearize(fm.open_loop(scene)).motion
     start = model.loop.start(model.period)
-    return NonlinearPeriod(scene, model, start, motion).matrix()
+    return NonlinearPeriod(scene, model, start, motion, integrals).matrix()
 
 
 def apart(one: Real, other: Real) -> float:
@@ -155,6 +155,19 @@ def apart(one: Real, other: Real) -> float:
 def test_the_model_is_the_derivative_of_a_period_of_the_nonlinear_loop(scene: fm.Scene) -> None:
     model = fm.linearize_sampled(scene)
     assert apart(model.A, differences(scene, model)) < DIFFERENCES
+
+
+def test_it_is_where_an_integral_holds_the_loads() -> None:
+    """A pendulum held away from where it hangs, with a delay: without the integral's torque A is another one."""
+    law = fm.Pid(
+        name="law", inputs=("angle",), kp=90.0, ki=60.0, kd=30.0, setpoint=0.4, period_s=0.02, delay_s=0.03
+    )  # fmt: skip
+    scene = pendulum(law, torque=fm.ControlSignal(source="law")).scene()
+    model = fm.linearize_sampled(scene)
+    torque = fm.compile(fm.open_loop(scene)).inverse_dynamics(model.state, np.zeros(2))[0]
+    right = differences(scene, model, law=float(torque))
+    assert apart(model.A, right) < DIFFERENCES
+    assert apart(fm.linearize_sampled(scene, state=model.state).A, right) > 1e3 * DIFFERENCES
 
 
 def test_a_wrong_hold_and_a_missed_delay_are_seen(monkeypatch: pytest.MonkeyPatch) -> None:
