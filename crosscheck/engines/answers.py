@@ -182,6 +182,7 @@ def _known(scene: Scene) -> dict[str, set[str]]:
     hinges, wheels = _names(scene.hinges), _names(scene.wheels)
     return {
         "loads": hinges | _names(scene.constraints) | _names(scene.point_masses),
+        "total_loads": _names(scene.total_loads),
         "wheel_loads": wheels,
         "drives": hinges | wheels | _names(scene.point_masses),
         "connectors": _names(connector for connector in scene.connectors if isinstance(connector, BetweenNodes)),
@@ -241,6 +242,7 @@ def _undetermined(answer: Trajectory, scene: Scene) -> tuple[str, ...]:
     """
     _instance(answer.undetermined, tuple, "undetermined")
     there = {f"load:{name}.{part}": len(AXES) for name in answer.loads for part in LOAD_PARTS}
+    there |= {f"total_load:{name}.{part}": len(AXES) for name in answer.total_loads for part in LOAD_PARTS}
     there |= {f"drive:{name}": values.shape[-1] for name, values in answer.drives.items() if np.ndim(values) == 2}
     for each in answer.undetermined:
         _require(
@@ -297,12 +299,12 @@ def _envelope(answer: Any, run: Trajectory) -> dict[str, Real]:
 
 def _determined(run: Trajectory, output: str, name: str, values: Real) -> Real:
     """The columns of an output that the motion determines."""
-    if not run.undetermined or output not in ("loads", "drives"):
+    if not run.undetermined or output not in ("loads", "total_loads", "drives"):
         return values
     is_open = Openness.of(run.undetermined)
     if output == "drives":
         return values[:, ~is_open.flags(f"drive:{name}", values.shape[1])]
-    flags = [is_open.flags(f"load:{name}.{part}", len(AXES)) for part in LOAD_PARTS]
+    flags = [is_open.flags(f"{output.removesuffix('s')}:{name}.{part}", len(AXES)) for part in LOAD_PARTS]
     return values[:, ~np.concatenate(flags)]
 
 

@@ -6,8 +6,11 @@ from dataclasses import dataclass, field, replace
 
 from crosscheck.engines.answers import checked_ladder, checked_model, checked_run, checked_support, checked_version
 from crosscheck.engines.contract import USUAL_S, Effort, Engine, Model, Run, Snapshot, Support, Trajectory
+from crosscheck.engines.total_loads import SceneWithPoints
 from flexmb.scene.schema import Scene, UserLaw
 
+TOTAL_LOADS = "total_loads"
+"""What an adapter names in `takes` that sums loads itself; for others it is done here."""
 LATER = ("connectors", "couplings", "controllers", "events")
 """Collections that scenes did not have when the contract was first written; `takes` names those an adapter handles."""
 NO_START = "begins all runs at t = 0"
@@ -36,7 +39,7 @@ class CheckedEngine:
 
         User-defined controller laws are refused for every engine: records would not notice when they change.
         """
-        known = getattr(self.engine, "takes", ())
+        known, scene = getattr(self.engine, "takes", ()), self._given(scene)
         if self.t_start != 0.0 and "t_start" not in known:
             return Support("no", f"the adapter of engine {self.name} {NO_START}")
         for collection in LATER:
@@ -51,27 +54,45 @@ class CheckedEngine:
 
     def efforts(self, scene: Scene) -> tuple[Effort, ...]:
         """The ladder for the duration from the engine's `efforts_for` if it has one, else its `efforts`."""
+        scene = self._given(scene)
         if (by_duration := getattr(self.engine, "efforts_for", None)) is not None:
             return checked_ladder(by_duration(scene, self.duration_s))
         return checked_ladder(self.engine.efforts(scene))
 
     def compile(self, scene: Scene) -> Model:
-        return CheckedModel(checked_model(self.engine.compile(scene)), scene)
+        watched = self._watched(scene)
+        given = scene if watched is None else watched.given
+        return CheckedModel(checked_model(self.engine.compile(given)), given, watched)
+
+    def _watched(self, scene: Scene) -> SceneWithPoints | None:
+        """How total loads are found for an engine that sums no loads itself."""
+        if not scene.total_loads or TOTAL_LOADS in getattr(self.engine, "takes", ()):
+            return None
+        return SceneWithPoints.of(scene)
+
+    def _given(self, scene: Scene) -> Scene:
+        """The scene that the engine gets."""
+        watched = self._watched(scene)
+        return scene if watched is None else watched.given
 
 
 @dataclass(frozen=True)
 class CheckedModel:
-    """A compiled scene whose trajectories are checked; each run gets its own copy of the sample times."""
+    """A compiled scene whose trajectories are checked; each run gets its own copy of the sample times. `watched`: how
+    total loads are found where the engine sums none."""
 
     model: Model
     scene: Scene
+    watched: SceneWithPoints | None = None
 
     def warm_up(self) -> None:
         self.model.warm_up()
 
     def evaluate(self) -> Snapshot:
-        return self.model.evaluate()
+        answer = self.model.evaluate()
+        return answer if self.watched is None else self.watched.told(answer)
 
     def simulate(self, run: Run, effort: Effort) -> Trajectory:
         own = replace(run, times=run.times.copy())
-        return checked_run(self.model.simulate(own, effort), run.times, self.scene)
+        answer = checked_run(self.model.simulate(own, effort), run.times, self.scene)
+        return answer if self.watched is None else self.watched.told(answer)

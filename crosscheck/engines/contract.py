@@ -91,6 +91,8 @@ class Snapshot:
     knows them.
     `momentum` (6,): [angular about the World origin; linear]. `connectors[name]` (6,): [torque; force] of a connector
     between nodes on body_b about frame B; `hinge_forces[name]` (1,): of one along a hinge, along its coordinate.
+    `total_loads[name]` (6,): the sum that the scene names, on its body about its node; found from `loads` for an engine
+    whose `takes` does not name "total_loads".
     """
 
     markers: dict[str, MarkerSnapshot]
@@ -101,6 +103,7 @@ class Snapshot:
     momentum: Real | None
     connectors: dict[str, Real] = field(default_factory=dict)
     hinge_forces: dict[str, Real] = field(default_factory=dict)
+    total_loads: dict[str, Real] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -128,7 +131,7 @@ class Trajectory:
 
     All answers are checked before they are recorded (`crosscheck.engines.answers`); an invalid one counts as *failed*.
     Names are those of the scene. A marker, load or energy that is left out is a channel that the engine does not offer.
-    `loads`, `wheel_loads`, `connectors` (T,6); `drives` (T,n); `hinge_forces` (T,1); `energy` of each kind (T,);
+    `loads`, `total_loads`, `wheel_loads`, `connectors` (T,6); `drives` (T,n); `hinge_forces` (T,1); `energy` (T,) each;
     `momentum` (T,6); `work` (T,): the work done so far by drives, motors, dampers, friction, actuators and loads, if
     the engine integrates it. `wall_s` is the time of the solve alone, without that of `derivatives` and `frequencies`,
     which are given only where the run asks for them: `derivatives` "by_displacement", "by_speed" and "by_force"
@@ -136,10 +139,11 @@ class Trajectory:
     displacements of `crosscheck.engines.linear.coordinates`; `frequencies` (T,n) rad/s as
     `crosscheck.engines.linear.frequencies` defines them; `known_to` (T,), by these names and "frequencies", says how
     far (Frobenius norm) they may be from those of the same state in exact arithmetic. `undetermined`: what redundant
-    closures leave undetermined: channels "load:<name>.torque", "load:<name>.force", "drive:<name>", or components of
-    theirs, "load:<name>.force[y, z]" in World axes, "drive:<name>[2]" from 1. These may hold NaN, and no others may;
-    they are not compared. An engine that names a component that the motion determines has failed; on a scene without
-    closures and couplings that is all of them. `events`: name and time (s) of what happened, in the order of time.
+    closures leave undetermined: channels "load:<name>.torque", "load:<name>.force", "drive:<name>", those of
+    "total_load:<name>" likewise, or components of theirs, "load:<name>.force[y, z]" in World axes, "drive:<name>[2]"
+    from 1. These may hold NaN, and no others may; they are not compared. An engine that names a component
+    that the motion determines has failed; on a scene without closures and couplings that is all of them. `events`: name
+    and time (s) of what happened, in the order of time.
     `envelope`, only where the run asks for it: by channel the extremes over all of its steps and both sides of events,
     as rows of `crosscheck.engines.extremes`. `evaluations` of the right-hand side (of the residual, for implicit
     solvers), `steps` made, refused ones too, and floating-point `operations` are 0 where the engine does not count
@@ -155,6 +159,7 @@ class Trajectory:
     drives: dict[str, Real] = _by_name(None)
     connectors: dict[str, Real] = _by_name(6)
     hinge_forces: dict[str, Real] = _by_name(1)
+    total_loads: dict[str, Real] = _by_name(6)
     energy: dict[str, Real] = _by_name()
     momentum: Real | None = _single(6)
     work: Real | None = _single()
@@ -199,7 +204,8 @@ class Engine(Protocol):
     Optional attributes: `summary`, one line for `crosscheck engines`; for timing reports `algorithm`, a few words, and
     `settings`, a sentence or two on how it is run: its best solver, what is switched off, whose loop steps it, and what
     its `wall_s` contains. `takes` names what its adapter handles of "connectors", "couplings", "controllers" and
-    "events" (a scene with others is refused) and "t_start" (runs that begin at another time than 0).
+    "events" (a scene with others is refused), "total_loads" (it is not given them otherwise) and "t_start" (runs that
+    begin at another time than 0).
     `methods` are integrators that efforts may name besides those of its ladders: a sweep refuses others at once.
     `precision` is "single" where the code computes with 32-bit floats, else "double": the clauses of the contract take
     their bounds from its unit roundoff; verdicts on cases do not, since U follows from the engine's efforts.

@@ -70,7 +70,7 @@ class NativeEngine:
         "faster. Compiling is not timed, and outputs are computed after the timed solve."
     )
 
-    takes = ("connectors", "couplings", "controllers", "events", "t_start")
+    takes = ("connectors", "couplings", "controllers", "events", "total_loads", "t_start")
     methods = get_args(Method)
 
     def __init__(
@@ -191,6 +191,10 @@ class NativeModel:
             momentum=seen.momentum,
             connectors=seen.connectors,
             hinge_forces=seen.hinge_forces,
+            total_loads={
+                total.name: self._system.total_load(state, total.joints, total.body, about=(total.body, total.node))
+                for total in self.scene.total_loads
+            },
         )
 
     def simulate(self, run: Run, effort: Effort) -> Trajectory:
@@ -249,6 +253,7 @@ def _extremes(envelope: Envelope, run: Trajectory) -> dict[str, Real]:
         markers={name: MarkerPath(place, nothing, speeds[name]) for name, place in places.items()},
         loads=of(envelope.loads), wheel_loads=of(envelope.wheel_loads), drives=of(envelope.drives),
         connectors=of(envelope.connectors), hinge_forces=of(envelope.hinge_forces),
+        total_loads=of(envelope.total_loads),
         energy={kind: found[:, 0] for kind, found in energy.items()}, momentum=rows(envelope.momentum),
     )  # fmt: skip
     channels = channels_of(seen) | ({"energy.total": energy["total"]} if run.energy else {})
@@ -263,10 +268,11 @@ def _extremes(envelope: Envelope, run: Trajectory) -> dict[str, Real]:
 def _undetermined(done: NativeTrajectory) -> Iterator[tuple[str, Flags]]:
     """Channels of loads and drives with flags of their open components."""
     for name, is_open in done.undetermined.items():
-        if name.endswith(".drive") and name not in done.loads:
+        if name.endswith(".drive") and name not in done.loads | done.total_loads:
             yield f"drive:{name.removesuffix('.drive')}", is_open
         else:
-            yield from ((f"load:{name}.{part}", is_open[place]) for part, place in LOAD_PARTS.items())
+            kind = "total_load" if name in done.total_loads else "load"
+            yield from ((f"{kind}:{name}.{part}", is_open[place]) for part, place in LOAD_PARTS.items())
 
 
 def _approximation(scene: Scene, algorithm: Algorithm) -> str:

@@ -18,6 +18,8 @@ from flexmb.typing import Flags, Real
 LOAD_PARTS = {"torque": slice(0, 3), "force": slice(3, 6)}
 """The channels of a load (6,) [torque; force]."""
 AXES = "xyz"
+OF_LOADS = "load:", "total_load:"
+"""How channels of loads begin."""
 ALL = None
 """All components of a channel, however many it has."""
 Components = frozenset[int] | None
@@ -112,7 +114,7 @@ def _union(items: Iterable[tuple[str, Components]]) -> dict[str, Components]:
 
 def _every(channel: str) -> Components:
     """All three components of a load; of a drive nobody knows here how many there are."""
-    return frozenset(range(len(AXES))) if channel.startswith("load:") else ALL
+    return frozenset(range(len(AXES))) if channel.startswith(OF_LOADS) else ALL
 
 
 def _read(name: str) -> tuple[str, Components]:
@@ -123,7 +125,7 @@ def _read(name: str) -> tuple[str, Components]:
     channel, words = listed["channel"], listed["listed"].split(",")
     if words == ["all"]:
         return channel, ALL
-    is_load = channel.startswith("load:")
+    is_load = channel.startswith(OF_LOADS)
     known = {axis: i for i, axis in enumerate(AXES)} if is_load else {}
     numbers = [known.get(word.strip(), -1) if is_load else _from_one(word.strip()) for word in words]
     if min(numbers) < 0:
@@ -141,4 +143,4 @@ def _numbers(flags: Flags) -> frozenset[int]:
 
 
 def _words(channel: str, found: frozenset[int]) -> str:
-    return ", ".join(AXES[i] if channel.startswith("load:") else str(i + 1) for i in sorted(found))
+    return ", ".join(AXES[i] if channel.startswith(OF_LOADS) else str(i + 1) for i in sorted(found))

@@ -55,6 +55,9 @@ def flexible_bodies(scene: Scene) -> list[BeamBody | ModalBody]:
 
 def tree_data(scene: Scene) -> Data:
     """The content of `model.json`. CaseError as for `model_data`."""
+    if scene.total_loads:
+        name = scene.total_loads[0].name
+        raise CaseError(f'an export has the loads of joints, and no sums of them: leave out the total load "{name}"')
     flexible = {body.name for body in flexible_bodies(scene)}
     branches = ordered(scene)
     bodies = [_body(branch.body, flexible) for branch in branches]

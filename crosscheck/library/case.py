@@ -73,7 +73,7 @@ A case is a folder ``cases/<family>/<case>/`` with ``scene.toml`` (and further s
     reference = "rigid"
 
 Channels are named ``marker:<name>.position | orientation | velocity | angular_velocity``, ``energy.<kind>``,
-``energy.total``, ``momentum.angular | linear``, ``load:<hinge>.torque | force``,
+``energy.total``, ``momentum.angular | linear``, ``load:<hinge>.torque | force``, ``total_load:<name>.torque | force``,
 ``wheel_load:<wheel>.torque | force`` and ``drive:<name>``; of the linearised motion, where a variant asks for it,
 ``derivatives.by_displacement | by_speed | by_force`` and ``frequencies`` (`crosscheck.engines.linear`). A pattern is a
 channel, a shell pattern of one (``marker:*.position``), or its beginning (``load``, ``load:elbow``, ``energy``); the

@@ -79,6 +79,7 @@ KINDS = (
         parts=(Part("angular", "Angular momentum", 3, "N m s"), Part("linear", "Linear momentum", 3, "N s")),
     ),
     ChannelKind("load", "Hinge loads", of_items=True, parts=_load("Hinge")),
+    ChannelKind("total_load", "Total loads", of_items=True, parts=_load("Total")),
     ChannelKind("wheel_load", "Wheel loads", of_items=True, parts=_load("Wheel bearing")),
     ChannelKind("connector", "Connector loads", of_items=True, parts=_load("Connector")),
     ChannelKind("hinge_force", "Connector loads", of_items=True, parts=(Part("", "Loads along hinges", None),)),

@@ -226,6 +226,9 @@ FAULTS = (
         _reversed("hinge_forces"),
     ),
     AnswerFault(
+        "total_load_reaction", "total loads negated", "load of the body for that on it", _reversed("total_loads")
+    ),
+    AnswerFault(
         "wheel_load_reaction", "wheel loads negated", "load on the body for that on the wheel", _reversed("wheel_loads")
     ),
     AnswerFault(
@@ -286,7 +289,7 @@ FAULTS = (
 
 def run_of(times: Real, channels: dict[str, Real]) -> Trajectory:
     """The run with these channels (T, k): the inverse of `channels_of`."""
-    kinds = ("marker", "load", "wheel_load", "connector", *ALONG)
+    kinds = ("marker", "load", "total_load", "wheel_load", "connector", *ALONG)
     names: dict[str, dict[str, None]] = {kind: {} for kind in kinds}
     for channel in channels:
         kind, of_item, rest = channel.partition(":")
@@ -309,6 +312,7 @@ def run_of(times: Real, channels: dict[str, Real]) -> Trajectory:
             for name in names["marker"]
         },
         loads={name: pair(f"load:{name}", "torque", "force") for name in names["load"]},
+        total_loads={name: pair(f"total_load:{name}", "torque", "force") for name in names["total_load"]},
         wheel_loads={name: pair(f"wheel_load:{name}", "torque", "force") for name in names["wheel_load"]},
         drives={name: channels[f"drive:{name}"] for name in names["drive"]},
         connectors={name: pair(f"connector:{name}", "torque", "force") for name in names["connector"]},

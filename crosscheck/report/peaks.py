@@ -17,7 +17,7 @@ HEADER = (
     "case", "variant", "engine", "channel", "component", "unit", "least", "at [s]", "greatest", "at [s]", "error",
     "over",
 )  # fmt: skip
-LOADS = "load", "wheel_load", "connector", "hinge_force", "drive"
+LOADS = "load", "total_load", "wheel_load", "connector", "hinge_force", "drive"
 MOST = 5  # of each kind of load that the table has, for a variant and an engine
 
 

@@ -60,7 +60,11 @@ def _by_flexmb(scene: Scene) -> Openness:
     state = system.initial_state
     evaluation = system.evaluate(state.t, state.q, state.u)
     flags = {name: np.isnan(load) for name, load in evaluation.loads.items()}
-    return _openness(flags, {name: np.isnan(drive) for name, drive in evaluation.drives.items()})
+    totals = {
+        total.name: np.isnan(system.total_load(state, total.joints, total.body, about=(total.body, total.node)))
+        for total in scene.total_loads
+    }
+    return _openness(flags, totals, {name: np.isnan(drive) for name, drive in evaluation.drives.items()})
 
 
 def _open(scene: Scene) -> Openness:
@@ -145,10 +149,15 @@ def _at(dense: DenseSystem, state: State, held: Held) -> Openness:
     found, always = open_loads(dense, state.q, held), _prescribed(dense)
     sometimes = {x.owner for x in dense.tree.scalars if held[x.u] and not always[x.u]}
     drives = {name: flags | (name in sometimes and np.any(flags)) for name, flags in found.drives.items()}
-    return _openness(found.loads, drives)
+    return _openness(found.loads, found.total_loads, drives)
 
 
-def _openness(loads: Mapping[str, Flags], drives: Mapping[str, Flags]) -> Openness:
-    """From flags (6,) of loads and (k,) of drive loads, by name."""
-    parts = ((f"load:{name}.{part}", flags[at]) for name, flags in loads.items() for part, at in LOAD_PARTS.items())
+def _openness(loads: Mapping[str, Flags], totals: Mapping[str, Flags], drives: Mapping[str, Flags]) -> Openness:
+    """From flags (6,) of loads and their sums and (k,) of drive loads, by name."""
+    parts = (
+        (f"{kind}:{name}.{part}", flags[at])
+        for kind, group in (("load", loads), ("total_load", totals))
+        for name, flags in group.items()
+        for part, at in LOAD_PARTS.items()
+    )
     return Openness.of_flags(chain(parts, ((f"drive:{name}", flags) for name, flags in drives.items())))

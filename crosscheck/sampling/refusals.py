@@ -58,8 +58,8 @@ def _quantities(sweep: SweepFile, scene: Scene) -> Iterator[Defect]:
 def _items(scene: Scene) -> dict[str, list[str]]:
     """The names of the scene's items by kind of channel."""
     of = {
-        "marker": scene.markers, "load": (*scene.hinges, *scene.constraints), "wheel_load": scene.wheels,
-        "connector": scene.connectors,
+        "marker": scene.markers, "load": (*scene.hinges, *scene.constraints),
+        "total_load": scene.total_loads, "wheel_load": scene.wheels, "connector": scene.connectors,
     }  # fmt: skip
     return {kind: [item.name for item in items] for kind, items in of.items()}
 

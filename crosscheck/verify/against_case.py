@@ -67,6 +67,7 @@ def _shapes(scene: Scene) -> dict[str, int]:
     items = {
         "marker": [marker.name for marker in scene.markers],
         "load": [hinge.name for hinge in scene.hinges],
+        "total_load": [total.name for total in scene.total_loads],
         "wheel_load": [wheel.name for wheel in scene.wheels],
     }
     return {

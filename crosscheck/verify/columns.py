@@ -25,7 +25,7 @@ LOAD_GROUPS = {part.name: part.letters for part in kind_named("load").parts}
 # The channels of Trajectory.to_csv that are compared: kind and part by the names of the columns.
 OWN_GROUPS = {part.own: (kind, part) for kind in ("marker", "load") for part in kind_named(kind).parts}
 OWN_HEADER = re.compile(r"(.+) \[([^\]]*)\]")
-STORED = ("marker:", "load:", "wheel_load:", "drive:")  # prefixes of items' channels in a reference.csv
+STORED = ("marker:", "load:", "total_load:", "wheel_load:", "drive:")  # prefixes of items' channels in a reference.csv
 DRIVE = "drive"
 LIMIT = 128 * MIB
 FEWEST = 8  # fewest samples at times of its own: fewer say too little about a motion

@@ -37,7 +37,7 @@ class Evidence:
 
     @property
     def is_load(self) -> bool:
-        return self.channel.startswith(("load:", "wheel_load:"))
+        return self.channel.startswith(("load:", "total_load:", "wheel_load:"))
 
     @property
     def is_visible(self) -> bool:

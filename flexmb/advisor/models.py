@@ -46,6 +46,8 @@ def spring_hinged(scene: Scene, name: str) -> Scene:
         raise ValueError(f'the scene has no flexible body "{name}"')
     if any(state.body == name for state in scene.modal_states):
         raise ValueError(f'body "{name}" starts deformed: a spring hinge has no modal state')
+    if any(total.body == name for total in scene.total_loads):
+        raise ValueError(f'the clamp of body "{name}" becomes a body of its own: leave out its total loads')
     spring = _spring(body, fitted_hinge(scene, name))
     clamp = RigidBody(name=spring.parent, mass_kg=0.0, inertia_kg_m2=((0.0,) * 3,) * 3, nodes=(Node(name="root"),))
     bodies = [part for each in scene.bodies for part in ((clamp, rigid_equivalent(each)) if each is body else (each,))]

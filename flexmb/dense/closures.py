@@ -19,7 +19,7 @@ from flexmb.dense.jets import MovingFrame
 from flexmb.dense.members import Seat, rigid_model
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import IDENTITY, ZERO
-from flexmb.scene.tree import coupled
+from flexmb.scene.tree import coupled, joined_bodies
 from flexmb.typing import Real
 
 NOWHERE = rigid_model(0.0, np.zeros(3), np.zeros((3, 3)), {"origin": (ZERO, IDENTITY)})
@@ -142,11 +142,35 @@ def through_hinges(dense: DenseSystem, q: Real, loads: Mapping[str, Real]) -> di
 
 
 class OpenLoads(NamedTuple):
-    """Which loads the motion leaves open: components (6,) of those of hinges, closures and couplings, World axes, and
-    the drive loads (k,) of hinges, point masses and wheels for each of their coordinates that is held."""
+    """Which loads the motion leaves open: components (6,) of those of hinges, closures and couplings, and of the
+    scene's total loads, World axes, and the drive loads (k,) of hinges, point masses and wheels for each of their
+    coordinates that is held."""
 
     loads: dict[str, NDArray[np.bool_]]
+    total_loads: dict[str, NDArray[np.bool_]]
     drives: dict[str, NDArray[np.bool_]]
+
+
+def _total_changes(dense: DenseSystem, q: Real, changes: Mapping[str, Real]) -> dict[str, Real]:
+    """(6,...) by total load: what changes (6,...) of the loads of joints do to their sum about its node."""
+    still = Motions(q, np.zeros((1, dense.nu)), np.zeros((1, dense.nu)))
+    frames = member_frames(dense.tree, still)
+    points = {
+        closure.name: seat_frame(dense.tree, frames, *_sides(dense, closure)[1], still).position.value[0, 0]
+        for closure in dense.scene.closures
+    }
+    for k, member in enumerate(dense.tree.members):
+        points[member.hinge.name] = seat_frame(dense.tree, frames, k, member.outboard, still).position.value[0, 0]
+    found, joined = {}, joined_bodies(dense.scene)
+    for total in dense.scene.total_loads:
+        at = seat(dense, total.body, total.node, ZERO, IDENTITY)
+        about = seat_frame(dense.tree, frames, *at, still).position.value[0, 0]
+        found[total.name] = np.zeros_like(next(iter(changes.values())))
+        for name in total.joints:
+            sign = 1.0 if joined[name][1] == total.body else -1.0
+            torque = changes[name][:3] + np.cross(points[name] - about, changes[name][3:], axisb=0, axisc=0)
+            found[total.name] += sign * np.concatenate([torque, changes[name][3:]])
+    return found
 
 
 def open_loads(dense: DenseSystem, q: Real, held: NDArray[np.bool_]) -> OpenLoads:
@@ -173,7 +197,9 @@ def open_loads(dense: DenseSystem, q: Real, held: NDArray[np.bool_]) -> OpenLoad
     for x in dense.tree.scalars:
         if held[x.u]:
             places.setdefault(x.owner, []).append(x.u)
+    totals = _total_changes(dense, q, changes)
     return OpenLoads(
         {name: np.any(np.abs(change) > least, axis=1) for name, change in changes.items()},
+        {name: np.any(np.abs(change) > least, axis=1) for name, change in totals.items()},
         {name: reached[at] for name, at in places.items()},
     )

@@ -36,6 +36,11 @@ def refuse(scene: Scene) -> None:
             f'{name} cannot be exported: event "{scene.events[0].name}" changes the scene in a run: take the events '
             "out, or export the scene of each stage by itself"
         )
+    if scene.total_loads:
+        raise NotExportable(
+            f'{name} cannot be exported: the total load "{scene.total_loads[0].name}" is a sum that no compiled code '
+            "makes yet: take it out, and add the loads of its joints where the model is imported"
+        )
     if not scene.bodies or not (scene.hinges or scene.wheels or scene.point_masses):
         raise NotExportable(f"{name} cannot be exported: it has nothing that moves; add a hinge")
 

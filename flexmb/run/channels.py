@@ -24,13 +24,15 @@ class Path(Protocol):
 
 
 class Recorded(Protocol):
-    """A trajectory computed by flexmb or by another code: loads and connectors (T,6), drives and hinge forces (T,k),
-    energies (T,), momentum (T,6), work (T,)."""
+    """A trajectory computed by flexmb or by another code: loads, their sums and connectors (T,6), drives and hinge
+    forces (T,k), energies (T,), momentum (T,6), work (T,)."""
 
     @property
     def markers(self) -> Mapping[str, Path]: ...
     @property
     def loads(self) -> Mapping[str, Real]: ...
+    @property
+    def total_loads(self) -> Mapping[str, Real]: ...
     @property
     def wheel_loads(self) -> Mapping[str, Real]: ...
     @property
@@ -72,7 +74,10 @@ def channels_of(trajectory: Recorded) -> dict[str, Real]:
         channels[f"marker:{name}.orientation"] = path.quaternion
         channels[f"marker:{name}.angular_velocity"] = path.velocity[:, :3]
         channels[f"marker:{name}.velocity"] = path.velocity[:, 3:]
-    on_bodies = ("load", trajectory.loads), ("wheel_load", trajectory.wheel_loads), ("connector", trajectory.connectors)
+    on_bodies = (
+        ("load", trajectory.loads), ("total_load", trajectory.total_loads), ("wheel_load", trajectory.wheel_loads),
+        ("connector", trajectory.connectors),
+    )  # fmt: skip
     for prefix, loads in on_bodies:
         for name, load in loads.items():
             channels[f"{prefix}:{name}.torque"] = load[:, :3]

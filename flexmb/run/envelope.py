@@ -19,6 +19,7 @@ VECTORS: dict[Kind, tuple[str, tuple[str, ...]]] = {
     "velocity": ("marker", ("angular_velocity", "velocity")),
     "acceleration": ("marker", ("angular_acceleration", "acceleration")),
     "loads": ("load", ("torque", "force")),
+    "total_loads": ("total_load", ("torque", "force")),
     "wheel_loads": ("wheel_load", ("torque", "force")),
     "connectors": ("connector", ("torque", "force")),
 }
@@ -103,10 +104,10 @@ class Envelope:
     `steps` of its motion, at points within them and between these, and on both sides of every event.
 
     By name, with as many entries as the fields of `flexmb.Trajectory` have columns, in the same units and axes: loads,
-    wheel_loads, connectors (6,) [torque; force], drives, hinge_forces, signals, power; energy (1,), "total" among it;
-    of markers positions (3,), velocities and accelerations (6,) [angular; linear]. momentum (6,), q (nq,), u (nu,).
-    magnitudes (1,): norms of vectors, by channel, such as "load:hinge.torque", "marker:end.velocity". left_out: number
-    of points at which the results could not be evaluated, near singular positions of closed chains.
+    total_loads, wheel_loads, connectors (6,) [torque; force], drives, hinge_forces, signals, power; energy (1,), also
+    "total"; of markers positions (3,), velocities and accelerations (6,) [angular; linear]. momentum (6,), q (nq,),
+    u (nu,). magnitudes (1,): norms of vectors, by channel, such as "load:hinge.torque", "marker:end.velocity".
+    left_out: number of points at which the results could not be evaluated, near singular positions of closed chains.
     """
 
     t_start: float
@@ -117,6 +118,7 @@ class Envelope:
     connectors: dict[str, Extremes]
     drives: dict[str, Extremes]
     hinge_forces: dict[str, Extremes]
+    total_loads: dict[str, Extremes]
     positions: dict[str, Extremes]
     velocities: dict[str, Extremes]
     accelerations: dict[str, Extremes]
@@ -144,8 +146,8 @@ class Envelope:
 
 
 _PARTS = parts_of(
-    "loads", "wheel_loads", "connectors", "drives", "hinge_forces", "positions", "velocities", "accelerations",
-    "energy", "signals", "power", "magnitudes",
+    "loads", "wheel_loads", "connectors", "drives", "hinge_forces", "total_loads", "positions", "velocities",
+    "accelerations", "energy", "signals", "power", "magnitudes",
 )  # fmt: skip
 
 
@@ -192,8 +194,9 @@ def envelope(run: RunArrays, parts: Sequence[PartialEnvelope]) -> Envelope:
     return Envelope(
         t_start=float(run.t[0]), t_end=run.stopped_at, steps=whole.steps,
         loads=of("loads"), wheel_loads=of("wheel_loads"), connectors=of("connectors"), drives=of("drives"),
-        hinge_forces=of("hinge_forces"), positions=of("position"), velocities=of("velocity"),
-        accelerations=of("acceleration"), energy=of("energy"), momentum=whole.columns["momentum", ""],
+        hinge_forces=of("hinge_forces"), total_loads=of("total_loads"), positions=of("position"),
+        velocities=of("velocity"), accelerations=of("acceleration"), energy=of("energy"),
+        momentum=whole.columns["momentum", ""],
         signals=of("signals"), power=of("power"), q=whole.columns["q", ""], u=whole.columns["u", ""],
         magnitudes=whole.magnitudes, left_out=whole.left_out, channels=tuple(channels),
     )  # fmt: skip

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import repeat
 from time import perf_counter
 
 from flexmb.integrate.control import ACCEPTED, EVALUATIONS, FACTORISATIONS, JACOBIANS, REJECTED
 from flexmb.run.observing import observe
 from flexmb.run.propagate import Integration, Raw
-from flexmb.run.run_arrays import Statistics, fitting
+from flexmb.run.provenance import with_drives
+from flexmb.run.run_arrays import Statistics, fitting, told
+from flexmb.run.total_loads import total_load
 from flexmb.run.trajectory import Trajectory, gathered
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.system import System
@@ -43,6 +46,7 @@ def observed(system: System, times: Real, raw: Raw, algorithm: Algorithm, solve:
         q_names=q_names,
         u_names=u_names,
         **gathered(system.observation, rows),
+        total_loads={},
         work=states[:, -1],
         signals=signals,
         power=power,
@@ -57,7 +61,18 @@ def observed(system: System, times: Real, raw: Raw, algorithm: Algorithm, solve:
             output_s=perf_counter() - start,
         ),
     )
-    return fitting(Trajectory, parts)
+    run = fitting(Trajectory, parts)
+    return told(run, total_loads=_total_loads(run, system)) if system.scene.total_loads else run
+
+
+def _total_loads(run: Trajectory, system: System) -> dict[str, Real]:
+    """The sums of loads that the scene names (T,6), of a run without events."""
+    return {
+        total.name: total_load(
+            run, with_drives(run, repeat(system, len(run.t))), total.joints, total.body, (total.body, total.node)
+        )
+        for total in system.scene.total_loads
+    }
 
 
 def _why(trouble: DynamicsError | KeyboardInterrupt) -> Status:

@@ -5,7 +5,7 @@ quantities that the run did not store; and a way to repeat the run.
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from copy import copy
 from dataclasses import dataclass, replace
 
@@ -85,10 +85,15 @@ def _tighter(given: Settings) -> tuple[Settings, float]:
 def systems_at(run: RunArrays, made_by: Making) -> Iterator[System]:
     """One system after the other, for each output of a run; with controllers it is used until the next one is asked
     for."""
-    before, system = made_by.system, made_by.system
-    for i, t in enumerate(run.t.tolist()):
-        now = system_at(made_by, t)
-        if now is not before or (now.signals and i == 0):
+    return with_drives(run, (system_at(made_by, t) for t in run.t.tolist()))
+
+
+def with_drives(run: RunArrays, systems: Iterable[System]) -> Iterator[System]:
+    """The systems (T) of the outputs of a run with drives as controllers have set them, each for use until the next one
+    is asked for."""
+    before: System | None = None
+    for i, now in enumerate(systems):
+        if now is not before:
             before, system = now, _apart(now) if now.signals else now
         for number, signal in system.signals.items():
             at = named(signal.source)

@@ -20,7 +20,7 @@ from flexmb.tables.named import name_parts, parts_of
 from flexmb.tables.status import Status
 from flexmb.typing import Real
 
-SPATIAL = {"loads": 6, "wheel_loads": 6, "connectors": 6, "hinge_forces": 1}
+SPATIAL = {"loads": 6, "total_loads": 6, "wheel_loads": 6, "connectors": 6, "hinge_forces": 1}
 """Fields that are dictionaries of arrays by name of an item, with the number of columns."""
 SOME = "drives", "signals", "power"
 """Such fields with any number of columns."""
@@ -103,6 +103,7 @@ class RunArrays:
     statistics: Statistics
     connectors: dict[str, Real] = field(default_factory=dict)
     hinge_forces: dict[str, Real] = field(default_factory=dict)
+    total_loads: dict[str, Real] = field(default_factory=dict)
     restart: Restart | None = None
     signals: dict[str, Real] = field(default_factory=dict)
     power: dict[str, Real] = field(default_factory=dict)
@@ -119,10 +120,10 @@ class RunArrays:
     def undetermined(self) -> dict[str, NDArray[np.bool_]]:
         """Loads that the motion does not determine, because closures are redundant (docs/notation.md).
 
-        By name of a hinge or closure, which components (6,) of `loads` are NaN, at one output time or more; by
-        "<name>.drive" which (n,) of `drives`. Empty where all loads are determined.
+        By name of a hinge, closure or total load, which components (6,) of `loads` or `total_loads` are NaN, at one
+        output time or more; by "<name>.drive" which (n,) of `drives`. Empty where all loads are determined.
         """
-        return undetermined_loads(self.loads, self.drives)
+        return undetermined_loads(self.loads | self.total_loads, self.drives)
 
     @property
     def finished(self) -> bool:
@@ -164,11 +165,11 @@ class RunArrays:
 
 Run = TypeVar("Run", bound=RunArrays)
 Kind = Literal[
-    "q", "u", "position", "quaternion", "velocity", "acceleration", "loads", "wheel_loads", "connectors", "drives",
-    "hinge_forces", "energy", "work", "momentum", "signals", "power",
+    "q", "u", "position", "quaternion", "velocity", "acceleration", "loads", "total_loads", "wheel_loads", "connectors",
+    "drives", "hinge_forces", "energy", "work", "momentum", "signals", "power",
 ]  # fmt: skip
 """Kinds of results: fields of a run, or of the paths of its markers."""
-_BY_NAME: tuple[Kind, ...] = "loads", "wheel_loads", "connectors", "drives", "hinge_forces"
+_BY_NAME: tuple[Kind, ...] = "loads", "total_loads", "wheel_loads", "connectors", "drives", "hinge_forces"
 _OF_CONTROLLERS: tuple[Kind, ...] = "signals", "power"
 
 
@@ -217,7 +218,7 @@ def labels(kind: Kind, name: str, width: int, run: StateNames | None = None) -> 
             return _spatial(name, ("angular_velocity", "velocity"), ("rad/s", "m/s"))
         case "acceleration":
             return _spatial(name, ("angular_acceleration", "acceleration"), ("rad/s^2", "m/s^2"))
-        case "loads" | "wheel_loads" | "connectors":
+        case "loads" | "total_loads" | "wheel_loads" | "connectors":
             return _spatial(name, ("torque", "force"), ("N m", "N"))
         case "drives":
             return [(f"{name}.drive[{i}]", "N or N m") for i in range(width)]

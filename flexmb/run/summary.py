@@ -15,7 +15,7 @@ from flexmb.run.trajectory import Trajectory
 from flexmb.typing import Real
 
 MOST_EVENTS = 8  # number of events that are listed
-_LOADS = "load", "wheel_load", "connector"
+_LOADS = "load", "total_load", "wheel_load", "connector"
 
 
 def summary(trajectory: Trajectory) -> Listing:

@@ -18,6 +18,7 @@ from flexmb.run.envelope import Envelope, envelope
 from flexmb.run.peaks import part_of
 from flexmb.run.provenance import Making, error_estimate, has_made, system_at, systems_at
 from flexmb.run.run_arrays import MarkerPath, RunArrays, Way, joined, refuse_torn
+from flexmb.run.total_loads import total_load
 from flexmb.scene.quaternions import quaternion_of
 from flexmb.system.load_axes import Axes, Redundant
 from flexmb.system.observables import ENERGIES, Observation
@@ -41,7 +42,8 @@ class Trajectory(RunArrays):
     by kind (T,) J; momentum (T,6) [angular about the World origin; linear]; work (T,) J done since the start by drives,
     motors, dampers, friction, actuators and loads. `stopped_at` is the time of the last good state: the end of the run
     if it finished. connectors by name (T,6) [torque; force] on body_b about frame B, World axes; hinge_forces (T,1) of
-    connectors along hinges, along their coordinates. `restart`: resumes the run at its end, None if the run failed.
+    connectors along hinges, along their coordinates; total_loads by name (T,6) [torque; force] on their
+    body about their node, World axes. `restart`: resumes the run at its end, None if the run failed.
     `events`: the events that happened, in the order of time. If the scene has controllers: signals (T,k) by sensor and
     controller, and power (T,k) W that each output of a controller puts into the motion. Loads and drives that the
     motion does not determine, because closures are redundant, are NaN: see `undetermined`.
@@ -119,11 +121,9 @@ class Trajectory(RunArrays):
 
         It is determined where the sum is, although the single loads may be NaN: see `System.total_load` for what sums
         are, and for ValueError. With controllers, drives are what their outputs were. Raises DynamicsError if a state
-        has no accelerations.
+        has no accelerations. Sums that the scene names as `total_loads` are fields of the run.
         """
-        made_by = self._making("a sum of loads")
-        systems = enumerate(systems_at(self, made_by))
-        return np.array([system.total_load(self.state_at(i), joints, on, about=about) for i, system in systems])
+        return total_load(self, systems_at(self, self._making("a sum of loads")), joints, on, about)
 
     def section_loads(self, body: str, x: ArrayLike) -> SectionLoads:
         """Axial force, shear, bending and torsion across sections at x (X,) m of a beam, over time: arrays (T,X,...).

@@ -18,7 +18,8 @@ ROOT = Place()
 KINDS = {
     "bodies": "body", "hinges": "hinge", "closures": "closure", "couplings": "coupling", "connectors": "connector",
     "wheels": "wheel",
-    "point_masses": "point mass", "loads": "load", "markers": "marker", "modal_states": "modal state of body",
+    "point_masses": "point mass", "loads": "load", "markers": "marker", "total_loads": "total load",
+    "modal_states": "modal state of body",
     "nodes": "node", "sensors": "sensor", "controllers": "controller", "events": "event",
 }  # fmt: skip
 

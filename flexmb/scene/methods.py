@@ -226,6 +226,10 @@ class SchemaMethods(Collector):
         """
         return self._made(s.Marker, locals())
 
+    def total_load(self, name: str, joints: str | Sequence[str], body: str, *, node: str = "origin") -> Self:
+        """The sum of the loads that some hinges and closures exert on a body, about a node of it, as an output."""
+        return self._made(s.TotalLoad, locals())
+
     def modal_state(self, body: str, *, coordinates: ArrayLike, rates: ArrayLike = ()) -> Self:
         """Initial modal coordinates and rates of one flexible body (zero where not listed).
 

@@ -144,6 +144,19 @@ class Marker(SceneStruct, frozen=True, kw_only=True):
     offset_m: Vector = ZERO
 
 
+class TotalLoad(SceneStruct, frozen=True, kw_only=True):
+    """The sum of the loads that some hinges and closures exert on a body, about a node of it, as an output.
+
+    It is determined where the sum is: how two parallel pins share a force follows from flexibility alone, but not what
+    they carry together. `body` may be "ground".
+    """
+
+    name: str
+    joints: tuple[str, ...]
+    body: str
+    node: str = "origin"
+
+
 class ModalState(SceneStruct, frozen=True, kw_only=True):
     """Initial modal coordinates and rates of one flexible body (zero where not listed)."""
 
@@ -191,6 +204,7 @@ class Scene(SceneStruct, frozen=True, kw_only=True, weakref=True):
     point_masses: tuple[PointMass, ...] = ()
     loads: tuple[Load, ...] = ()
     markers: tuple[Marker, ...] = ()
+    total_loads: tuple[TotalLoad, ...] = ()
     modal_states: tuple[ModalState, ...] = ()
     sensors: tuple[Sensor, ...] = ()
     controllers: tuple[Controller, ...] = ()
@@ -229,8 +243,8 @@ __all__ = [
     "InertiaPoint", "Latch", "Level", "Load", "LoadSensor", "Marker", "MarkerSensor", "Matrix3", "ModalBody",
     "ModalNode", "ModalState", "Modes", "Node", "Pid", "PointMass", "ProfileSensor", "Pulse", "Quaternion", "Ramp",
     "Release", "RigidBody", "Saturation", "Scene", "SceneEvent", "Sensor", "SidBody", "Sine", "SmoothStep",
-    "SpinUp", "StateSpace", "StrainPolynomials", "Table", "TimeSensor", "TipMass", "UserLaw", "Vector", "Waiver",
-    "Wheel",
+    "SpinUp", "StateSpace", "StrainPolynomials", "Table", "TimeSensor", "TipMass", "TotalLoad", "UserLaw", "Vector",
+    "Waiver", "Wheel",
 ]  # fmt: skip
 __all__ += hinges.__all__
 __all__ += connectors.__all__

@@ -288,6 +288,12 @@ class EndFrame(NamedTuple):
     quaternion: Quaternion
 
 
+def joined_bodies(scene: Scene) -> dict[str, tuple[str, str]]:
+    """The bodies that each hinge and closure joins, by its name: its load is that on the second one."""
+    hinges = {hinge.name: (hinge.parent, hinge.child) for hinge in scene.hinges}
+    return hinges | {closure.name: (closure.body_a, closure.body_b) for closure in scene.closures}
+
+
 def ends(item: Closure | BetweenNodes) -> tuple[EndFrame, EndFrame]:
     """Frames A and B; where the item joins points only, the frames have the axes of their nodes."""
     return _end(item, "a"), _end(item, "b")

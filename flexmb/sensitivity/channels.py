@@ -68,6 +68,11 @@ def refuse_unknown_outputs(system: System, names: Sequence[str]) -> None:
     for name in names:
         if str(name).startswith("power."):
             raise NotImplementedError(f"output {name!r}: derivatives of powers of controllers are not available")
+        if any(str(name).startswith(f"{total.name}.") for total in scene.total_loads):
+            raise NotImplementedError(
+                f"output {name!r}: derivatives of total loads are not available: take the loads of the joints where "
+                "they are determined"
+            )
         if name not in known and ".drive[" not in str(name):
             raise ValueError(f"there is no output {name!r}: {closest(str(name), known)}")
 

@@ -43,10 +43,13 @@ def in_pieces(
 
     `places` maps nodes of the beam to the new places of its hinges, wheels, point masses, loads, markers, closures and
     connectors. The joints follow the beam's inboard hinge. Raises ValueError for a beam with an initial modal state,
-    because the pieces start undeformed.
+    because the pieces start undeformed, and for one on which loads are totalled.
     """
     if any(state.body == beam.name for state in scene.modal_states):
         raise ValueError(f'beam "{beam.name}": its pieces start undeformed; leave out its modal state')
+
+    if total := next((total for total in scene.total_loads if total.body == beam.name), None):
+        raise ValueError(f'beam "{beam.name}": its joints hold several pieces; leave out the total load "{total.name}"')
 
     def moved(item: Any, body_key: str, node_key: str) -> Any:
         if getattr(item, body_key) != beam.name:

@@ -159,14 +159,21 @@ class Constraints:
 
     def total_load(self, state: State, signs: Mapping[str, float], about: tuple[str, str]) -> Real:
         """See `System.total_load`; `signs` of the loads by the names of joints."""
-        t, y = self._system.layout.entering(state)
-        motion = self._motion(t, y, "articulated")
+        return self._total(self._motion(*self._system.layout.entering(state), "articulated"), state, signs, about)
 
+    def total_load_across(self, state: State, signs: Mapping[str, float], about: tuple[str, str]) -> Real:
+        """The same, and also at a singular position in a run."""
+        motion = self._motion_across(*self._system.layout.entering(state), "articulated")
+        return self._total(motion, state, signs, about)
+
+    def _total(
+        self, motion: ClosedMotion, state: State, signs: Mapping[str, float], about: tuple[str, str]
+    ) -> Real:
         def summed(loads: dict[str, Real]) -> Real:
             there = self._system.in_axes(state, loads, axes="world", about=about)
             return np.asarray(np.sum([sign * there[name] for name, sign in signs.items()], axis=0))
 
-        load = finite_result(summed(self._by_load(motion.hinges, motion.closures)), t)
+        load = finite_result(summed(self._by_load(motion.hinges, motion.closures)), state.t)
         if motion.spread is None:
             return load
         changes = np.array([summed(change) for change in self._changes(motion.spread)])

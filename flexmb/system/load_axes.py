@@ -8,6 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from flexmb.scene.schema import Scene
+from flexmb.scene.tree import joined_bodies
 from flexmb.system.frames import MotionTables, hinge_frames, node_pose
 from flexmb.system.scene_arrays import SceneArrays
 from flexmb.tables import arguments
@@ -22,8 +23,7 @@ def held_by(scene: Scene, joints: Sequence[str], on: str) -> dict[str, float]:
     """The signs with which the loads of some hinges and closures act on a body, by name; ValueError for others."""
     if isinstance(joints, str) or len(set(joints)) < max(1, len(joints)):
         raise ValueError(f"joints is {joints!r}: give the names of hinges and closures, each once")
-    sides = {hinge.name: (hinge.parent, hinge.child) for hinge in scene.hinges}
-    sides |= {closure.name: (closure.body_a, closure.body_b) for closure in scene.closures}
+    sides = joined_bodies(scene)
     carriers = {}
     for name in joints:
         if name not in sides:

@@ -89,9 +89,17 @@ class MujocoObserver(TreeObserver):
         return loads
 
     def _rows(self, data: mujoco.MjData) -> Real:
-        """Forces of the rows of all closures, then of all couplings."""
+        """Forces of the rows of all closures, three for each point, then of all couplings, one for each.
+
+        MuJoCo leaves out those that no coordinate moves, as of a pin on the axis of another one: their forces are zero.
+        """
+        points = sum(len(closed.points) for closed in self._closures)
         rows = data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_EQUALITY
-        return data.efc_force[: data.nefc][rows]
+        which = data.efc_id[: data.nefc][rows]
+        of_its_own = np.arange(len(which)) - np.searchsorted(which, which)
+        found = np.zeros(3 * points + len(self._couplings))
+        found[np.where(which < points, 3 * which, 2 * points + which) + of_its_own] = data.efc_force[: data.nefc][rows]
+        return found
 
     def _held(self, data: mujoco.MjData) -> Real:
         """Loads of the couplings."""

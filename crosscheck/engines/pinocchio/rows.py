@@ -120,6 +120,7 @@ class PinocchioRows:
         rows = np.zeros((6, self._model.nv))
         if joint:
             J = pin.getJointJacobian(self._model, self._data, joint, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+            J = J.reshape(rows.shape)  # that of one speed comes as a vector
             arm = point - self._data.oMi[joint].translation
             rows[:3], rows[3:] = J[3:], J[:3] + cross(J[3:].T, arm).T
         return rows

@@ -72,6 +72,7 @@ def _parts(scene: Scene) -> tuple[tuple[str, tuple[Any, ...]], ...]:
     return (
         ("connector", scene.connectors),
         ("load", scene.loads),
+        ("total load", scene.total_loads),
         ("controller", scene.controllers),
         ("event", scene.events),
     )

@@ -21,10 +21,10 @@ from crosscheck.library.mutations.mutation import LESS, Mutation
 from flexmb.scene.bodies import BeamNode, Quaternion
 from flexmb.scene.connectors import BetweenNodes
 from flexmb.scene.hinges import Closure, Hinge
-from flexmb.scene.schema import Load, Marker, PointMass, Scene, Wheel
+from flexmb.scene.schema import Load, Marker, PointMass, Scene, TotalLoad, Wheel
 from flexmb.scene.tree import ends
 
-Mounted = Wheel | PointMass | Load | Marker
+Mounted = Wheel | PointMass | Load | Marker | TotalLoad
 EPS = 1e-15
 
 
@@ -63,9 +63,10 @@ def _node_position(node: AnyNode) -> AnyNode:
 
 
 def _node_idle(scene: Scene, target: str) -> str:
-    """Nothing is mounted at the node: neither a hinge, a closure, a connector, a wheel, a mass, a load nor a marker."""
+    """Nothing is at the node: no hinge, closure, connector, wheel, mass, load or marker, nor any sum of loads."""
     body, _, node = target.rpartition(".")
-    mounted: tuple[Mounted, ...] = (*scene.wheels, *scene.point_masses, *scene.loads, *scene.markers)
+    shown: tuple[Mounted, ...] = (*scene.markers, *scene.total_loads)
+    mounted: tuple[Mounted, ...] = (*scene.wheels, *scene.point_masses, *scene.loads, *shown)
     used = [(item.body, item.node) for item in mounted]
     used += [
         end for hinge in scene.hinges for end in ((hinge.parent, hinge.parent_node), (hinge.child, hinge.child_node))

@@ -74,6 +74,10 @@ def _moved(scene: Scene) -> Counterpart:
             channels_back["momentum.angular"] = channels_back["momentum.angular"] - np.cross(
                 STEP_M, channels_back["momentum.linear"]
             )
+        for total in (total for total in scene.total_loads if total.body == GROUND):  # about the origin of the World
+            torque, force = (f"total_load:{total.name}.{part}" for part in ("torque", "force"))
+            if torque in channels_back:
+                channels_back[torque] = channels_back[torque] - np.cross(STEP_M, channels_back[force])
         return {name: rows - STEP_M if name.endswith(".position") else rows for name, rows in channels_back.items()}
 
     other = on_ground(scene, placed)

@@ -46,7 +46,7 @@ RESTATED = Invariance("restated", "sections of beams stated at another reference
 
 COLLECTIONS = (
     "bodies", "hinges", "closures", "couplings", "connectors", "wheels", "point_masses", "loads", "markers",
-    "modal_states",
+    "total_loads", "modal_states",
 )  # fmt: skip
 
 

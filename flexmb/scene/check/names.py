@@ -11,14 +11,14 @@ from flexmb.scene.bodies import BeamBody, Body, ModalBody, RigidBody, SidBody
 from flexmb.scene.check.walk import entries
 from flexmb.scene.connectors import BetweenNodes
 from flexmb.scene.problems import Defect, Place, closest
-from flexmb.scene.schema import Closure, Scene
-from flexmb.scene.tree import GROUND, node_names
+from flexmb.scene.schema import Closure, Scene, TotalLoad
+from flexmb.scene.tree import GROUND, joined_bodies, node_names
 
 # Hinges, wheels, point masses, closures, couplings and connectors share tables of loads, drive loads and coordinates,
-# hence one set of names.
+# hence one set of names; total loads have columns of the same form.
 NAMESPACES = (
-    ("bodies",), ("hinges", "wheels", "point_masses", "closures", "couplings", "connectors"), ("loads",), ("markers",),
-    ("sensors", "controllers"), ("events",),
+    ("bodies",), ("hinges", "wheels", "point_masses", "closures", "couplings", "connectors", "total_loads"),
+    ("loads",), ("markers",), ("sensors", "controllers"), ("events",),
 )  # fmt: skip
 IMPLICIT: dict[type, tuple[str, ...]] = {RigidBody: ("origin",), BeamBody: ("origin", "root", "tip")}
 
@@ -70,8 +70,27 @@ def references(scene: Scene) -> Iterator[Defect]:
             yield from _attachment(place, bodies, *ends, ground=True)
         if isinstance(item, Closure) and item.body_a == item.body_b:
             yield Defect(str(place), f'the closure joins "{item.body_a}" to itself', "give two different bodies")
+    for place, total in entries(scene, "total_loads"):
+        yield from _attachment(place, bodies, ("body", total.body), ("node", total.node), ground=True)
+        yield from _summed(place, scene, total)
     for place, state in entries(scene, "modal_states"):
         yield from _body(place.key("body"), bodies.named, state.body)
+
+
+def _summed(place: Place, scene: Scene, total: TotalLoad) -> Iterator[Defect]:
+    """What is wrong with the joints of a total load."""
+    held = joined_bodies(scene)
+    if not total.joints:
+        yield Defect(str(place.key("joints")), "no joints are named", "name the hinges and closures whose loads to add")
+    for i, name in enumerate(total.joints):
+        at = str(place.key("joints", i))
+        if name not in held:
+            yield Defect(at, f'there is no hinge or closure "{name}"', closest(name, held))
+        elif name in total.joints[:i]:
+            yield Defect(at, f'"{name}" is named twice', "name each joint once")
+        elif total.body not in held[name]:
+            what = f'"{name}" joins "{held[name][0]}" and "{held[name][1]}", and exerts no load on "{total.body}"'
+            yield Defect(at, what, "leave the joint out, or name a body that all of the joints hold")
 
 
 def _nodes(body: Body) -> tuple[Any, ...]:

@@ -29,7 +29,7 @@ T = 11
 TIMES = np.linspace(0.0, 1.0, T)
 NAMES = {
     "hinges": "pivot", "wheels": "wheel", "closures": "loop", "point_masses": "bob", "markers": "tip",
-    "connectors": "spring",
+    "connectors": "spring", "total_loads": "sum",
 }  # fmt: skip
 OWN = {kind: [SimpleNamespace(name=name)] for kind, name in NAMES.items()}
 SCENE = cast(Scene, SimpleNamespace(**OWN, constraints=OWN["closures"]))
@@ -44,7 +44,8 @@ TURNS = numbers(4) / np.linalg.norm(numbers(4), axis=1, keepdims=True)
 TIP = MarkerPath(numbers(3), TURNS, numbers(6))
 GOOD = Trajectory(
     status="finished", message="fine", times=TIMES, markers={"tip": TIP},
-    loads={"pivot": numbers(6), "loop": -numbers(6), "bob": 2.0 * numbers(6)}, wheel_loads={"wheel": 3.0 * numbers(6)},
+    loads={"pivot": numbers(6), "loop": -numbers(6), "bob": 2.0 * numbers(6)}, total_loads={"sum": 6.0 * numbers(6)},
+    wheel_loads={"wheel": 3.0 * numbers(6)},
     drives={"pivot": numbers(2), "wheel": numbers(1)}, hinge_forces={"spring": 4.0 * numbers(1)},
     energy={kind: place + numbers() for place, kind in enumerate(("kinetic", "strain", "spring", "gravity"))},
     momentum=5.0 * numbers(6), work=7.0 * numbers(), wall_s=0.25, evaluations=123,
@@ -63,7 +64,7 @@ def test_a_sound_run_passes_whole_in_arrays_of_its_own() -> None:
     assert (run.status, run.message, run.wall_s, run.evaluations) == ("finished", "fine", 0.25, 123)
     assert (run.steps, run.operations) == (45, 678)
     given, found = arrays(GOOD), arrays(run)
-    assert found.keys() == given.keys() and len(found) == 24
+    assert found.keys() == given.keys() and len(found) == 26
     for name, values in given.items():
         assert np.array_equal(found[name], values)
         assert not np.shares_memory(found[name], values)

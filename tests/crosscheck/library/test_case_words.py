@@ -141,7 +141,8 @@ def test_the_plug_in_the_action_and_expectations_read_patterns_alike(tmp_path: P
 
 
 SAMPLES = 5
-NAMED = {name: ("a.b",) for name in ("loads", "wheel_loads", "drives", "connectors", "hinge_forces")}
+BY_ITEM = "loads", "total_loads", "wheel_loads", "drives", "connectors", "hinge_forces"
+NAMED = {name: ("a.b",) for name in BY_ITEM}
 NAMED |= {"energy": ENERGIES, "derivatives": DERIVATIVES, "known_to": (*DERIVATIVES, FREQUENCIES)}
 
 

@@ -29,7 +29,7 @@ from crosscheck.running.plan import plan
 from flexmb.scene.bodies import Node, RigidBody
 from flexmb.scene.connectors import AngularSpring, SpringDamper
 from flexmb.scene.hinges import AngularCoordinate, Revolute
-from flexmb.scene.schema import Marker, Scene, Wheel
+from flexmb.scene.schema import Marker, Scene, TotalLoad, Wheel
 from flexmb.typing import Real
 from tests.crosscheck.sessions import PROVIDER, copy_case, referenced, run_here
 
@@ -53,6 +53,7 @@ SCENE = Scene(
         AngularSpring(name="coil", hinge="pivot", stiffness_Nm_rad=1.0),
     ),
     markers=(Marker(name="tip", body="arm", node="tip"),),
+    total_loads=(TotalLoad(name="held", joints=("pivot",), body="arm"),),
 )  # fmt: skip
 
 
@@ -64,7 +65,8 @@ def answer() -> Trajectory:
     return Trajectory(
         status="finished", message="", times=TIMES,
         markers={"tip": MarkerPath(rng.normal(size=(5, 3)), quaternion, rng.normal(size=(5, 6)))},
-        loads={"pivot": rng.normal(size=(5, 6))}, wheel_loads={"wheel": rng.normal(size=(5, 6))},
+        loads={"pivot": rng.normal(size=(5, 6))}, total_loads={"held": rng.normal(size=(5, 6))},
+        wheel_loads={"wheel": rng.normal(size=(5, 6))},
         drives={"pivot": rng.normal(size=(5, 1))}, connectors={"cable": rng.normal(size=(5, 6))},
         hinge_forces={"coil": rng.normal(size=(5, 1))},
         energy={kind: rng.normal(size=5) for kind in ("kinetic", "strain", "spring", "gravity")},

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import csv
 from io import StringIO
+from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -12,8 +13,12 @@ import pytest
 from rich.console import Console
 
 import flexmb
+from flexmb.export.refusals import NotExportable, refuse
+from flexmb.run.channels import channels_of
 from flexmb.run.summary import summary
 from flexmb.scene import schema as s
+from flexmb.scene.files import dumps, loads
+from flexmb.surrogate.segments import finite_segments
 from tests.bounds import relative
 from tests.flexmb.closure import mechanisms as m
 from tests.flexmb.closure.least import least_loads
@@ -175,3 +180,63 @@ def test_what_is_no_sum_is_refused(door: flexmb.System, joints: list[str], on: s
         door.total_load(door.initial_state, joints, on)
     with pytest.raises(ValueError, match="redundant"):
         door.hinge_loads(door.initial_state, redundant="guess")  # type: ignore[arg-type]
+
+
+def doubled(door: flexmb.System, **changes: object) -> s.Scene:
+    """The door with the sum of what its pins exert on it, of what they exert on the frame, and one of a single pin."""
+    totals = (
+        s.TotalLoad(name="pins", joints=("lower", "upper"), body="door", node="top"),
+        s.TotalLoad(name="frame", joints=("upper", "lower"), body="ground"),
+        s.TotalLoad(name="one", joints=("lower",), body="door"),
+    )
+    return msgspec.structs.replace(door.scene, total_loads=totals, **changes)
+
+
+def test_a_scene_names_sums_that_runs_have(door: flexmb.System, tmp_path: Path) -> None:
+    """As fields, columns, channels and peaks; open are those alone whose sum is, and they are told."""
+    scene = doubled(door)
+    assert loads(dumps(scene)) == scene
+    run = flexmb.simulate(scene, 0.4, samples=5)
+    for total in scene.total_loads:
+        expected = run.total_load(total.joints, total.body, about=(total.body, total.node))
+        assert np.array_equal(run.total_loads[total.name], expected, equal_nan=True)
+    assert np.isfinite(run.total_loads["pins"]).all() and np.isfinite(run.total_loads["frame"]).all()
+    assert np.allclose(run.total_loads["pins"][:, 3:], -run.total_loads["frame"][:, 3:], rtol=0.0, atol=1e-12)
+    assert {"one", "lower", "upper"} == set(run.undetermined)
+    found = channels_of(run)
+    assert np.array_equal(found["total_load:pins.force"], run.total_loads["pins"][:, 3:])
+    run.to_csv(tmp_path / "run.csv")
+    with (tmp_path / "run.csv").open(encoding="utf-8") as file:
+        last = list(csv.DictReader(file))[-1]
+    assert float(last["pins.force.z [N]"]) == run.total_loads["pins"][-1, 5]
+    peak = run.envelope.total_loads["pins"]
+    assert np.all(peak.least <= run.total_loads["pins"].min(axis=0))
+    assert np.all(peak.greatest >= run.total_loads["pins"].max(axis=0))
+    assert run.envelope.magnitudes["total_load:pins.force"].largest[0] > WEIGHT
+    whole = flexmb.simulate(scene, 0.2, samples=3).then(flexmb.simulate(scene, 0.4, t_start=0.2, samples=3))
+    assert whole.total_loads["pins"].shape == (5, 6)
+
+
+def test_sums_that_a_scene_names_follow_its_events_and_controllers() -> None:
+    """Of a tree: the sum of one hinge is its load, across an event and with a sampled controller."""
+    tree = flexmb.SceneBuilder("held", gravity=(0.0, 0.0, -9.81))
+    tree.rigid_body("arm", mass=1.0, com=(0.3, 0.0, 0.0), inertia=(0.1, 0.1, 0.1))
+    tree.revolute("pivot", "ground", "arm", axis=(0.0, 1.0, 0.0), torque=flexmb.ControlSignal(source="servo"))
+    tree.sense_coordinate("angle", "pivot").pid("servo", "angle", kp=20.0, period=0.05)
+    tree.event("stop", "time", 0.12, flexmb.Latch(coordinate="pivot.rotation")).total_load("sum", ["pivot"], "arm")
+    run = flexmb.simulate(tree.scene(), 0.3, samples=7)
+    assert len(run.events) == 1 and np.ptp(run.signals["servo"]) > 0.1
+    assert np.allclose(run.total_loads["sum"][:, 3:], run.loads["pivot"][:, 3:], rtol=1e-9, atol=1e-9)
+    assert np.ptp(run.loads["pivot"][:, 5]) > 0.1
+
+
+def test_what_cannot_have_sums_of_a_scene_says_so(door: flexmb.System) -> None:
+    scene = doubled(door)
+    with pytest.raises(NotImplementedError, match="derivatives of total loads"):
+        flexmb.sensitivities(scene, 0.1, ["door.mass_kg"], ["pins.force.z"])
+    tree = flexmb.SceneBuilder("arm").beam("arm", length=1.0, elements=4, modes=1, section=m.STEEL)
+    tree = tree.revolute("pivot", "ground", "arm").total_load("sum", ["pivot"], "arm").scene()
+    with pytest.raises(NotExportable, match='total load "sum"'):
+        refuse(tree)
+    with pytest.raises(ValueError, match='leave out the total load "sum"'):
+        finite_segments(tree, "arm", 3)
