@@ -10,8 +10,10 @@ import pytest
 pytest.importorskip("exudyn", reason="Exudyn is not installed: pip install flexmb[peers]")
 
 from crosscheck.engines.contract import Effort, EngineMissing, Run
-from crosscheck.engines.exudyn import ExudynBeamEngine, ExudynEngine, library
+from crosscheck.engines.exudyn import ExudynBeamEngine, ExudynEngine, library, solve
+from crosscheck.engines.native import NativeEngine
 from flexmb.scene import schema as s
+from flexmb.scene.build import SceneBuilder
 from flexmb.scene.functions import Ramp
 
 G = 9.81
@@ -79,10 +81,35 @@ def test_energy_momentum_and_order_across_every_hinge(kind):
     assert coarse / fine == pytest.approx(4.0, rel=0.05)
     drift = [np.ptp(sum(run.energy.values())) for run in runs]
     scale = runs[0].energy["kinetic"].max()
-    # second order, down to the Newton tolerance of 1e-8
+    # second order, down to the tolerance of Newton's method
     assert drift[2] < max(drift[0] / 10.0, 1e-7 * scale) and drift[2] < 1e-5 * scale
     momentum = runs[2].momentum
     assert np.ptp(momentum, axis=0).max() < 1e-5 * np.abs(momentum).max()
+
+
+def test_errors_on_light_links_fall_with_the_step(monkeypatch):
+    """A leg of links of tens of grams: what Newton's method leaves at its tolerance adds up over the steps, so that at
+    1e-8 errors stopped falling, and no U from steps contained them."""
+    leg = SceneBuilder("leg", gravity=(0.0, 0.0, -G))
+    leg.rigid_body("thigh", mass=0.162, com=(0.0, 0.0, -0.08), inertia=(4.7e-4, 4.7e-4, 1e-6))
+    leg.rigid_body("shank", mass=0.021, com=(0.0, 0.0, -0.076), inertia=(8.8e-5, 8.8e-5, 1e-6))
+    leg.rigid_body("foot", mass=0.01, inertia=np.zeros((3, 3)))
+    leg.revolute("hip", "ground", "thigh", axis=(1.0, 0.0, 0.0), rate=0.5)
+    leg.revolute("knee", "thigh", "shank", parent_position=(0.0, 0.0, -0.16), axis=(1.0, 0.0, 0.0), rate=0.5)
+    leg.weld("ankle", "shank", "foot", parent_position=(0.0, 0.0, -0.16))
+    scene, run = leg.marker("foot", "foot").scene(), Run(np.linspace(0.0, 0.5, 26))
+    exact = NativeEngine().compile(scene).simulate(run, Effort("tolerance", 1e-11, "dop853")).markers["foot"].velocity
+
+    def falls() -> list[float]:
+        found = []
+        for h in (5e-4, 2.5e-4, 1.25e-4):
+            done = ExudynEngine().compile(scene).simulate(run, Effort("step", h, "TrapezoidalIndex2"))
+            found.append(np.abs(done.markers["foot"].velocity - exact).max())
+        return [coarse / fine for coarse, fine in zip(found, found[1:], strict=False)]
+
+    assert falls() == pytest.approx([4.0, 4.0], rel=0.05)
+    monkeypatch.setattr(solve, "NEWTON_SETTINGS", ((1e-8, True),))
+    assert min(falls()) < 2.5
 
 
 def test_prescribed_wheel_passes_many_turns():
