@@ -3,6 +3,8 @@
 import re
 import textwrap
 import tomllib
+from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 import msgspec
@@ -20,7 +22,7 @@ from crosscheck.library.case import (
     Variant,
 )  # fmt: skip
 from crosscheck.library.check import check_run_file
-from crosscheck.library.find import load_case, resolve
+from crosscheck.library.find import Case, load_case, resolve, shipped_cases
 from crosscheck.library.selection import select
 from crosscheck.running.plan import refine, variant_scene
 from tests.crosscheck.sessions import CASE, copy_case
@@ -179,6 +181,19 @@ def test_a_shipped_engine_stays_out_of_a_variant_where_the_case_names_it_elsewhe
 def test_charts_follow_their_variants() -> None:
     run = select(example(), ("exudyn",))
     assert [chart.variants for chart in run.charts] == [("rigid",)]
+
+
+def uncharted(cases: Iterable[Case]) -> set[str]:
+    """Cases without a chart, though a variant of theirs is about a run."""
+    return {case.name for case in cases if not case.run.charts and not all(v.asks for v in case.run.variants)}
+
+
+def test_every_case_of_a_run_has_a_chart_of_speed_against_accuracy() -> None:
+    """Cases that are about the linearised motion alone have none: docs/timing.md says why."""
+    assert not uncharted(shipped_cases())
+    assert any(not case.run.charts for case in shipped_cases())
+    bare = [replace(case, run=msgspec.structs.replace(case.run, charts=())) for case in shipped_cases()]
+    assert {"manipulators/six_axis_arm", "chains/hundred_rods", "chains/thousand_rods"} <= uncharted(bare)
 
 
 def test_an_engine_beside_a_variant_runs_it_without_joining_its_pairs() -> None:
