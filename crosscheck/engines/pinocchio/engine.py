@@ -6,9 +6,10 @@ from collections.abc import Iterator
 from typing import get_args
 
 from crosscheck.engines.connections import KNOWN
-from crosscheck.engines.contract import Model
+from crosscheck.engines.contract import Effort, Model
+from crosscheck.engines.hybrid.refusals import is_hybrid
 from crosscheck.engines.peer import Library
-from crosscheck.engines.scipy_loop import METHODS, RTOL_LADDER
+from crosscheck.engines.scipy_loop import METHODS, RTOL_LADDER, ladder_for
 from crosscheck.engines.tree_engine import TreeCapabilities, TreeEngine
 from flexmb.scene.hinges import ClosureKind
 from flexmb.scene.schema import Scene
@@ -26,17 +27,21 @@ class PinocchioEngine(TreeEngine):
     algorithm = "articulated bodies, O(N)"
     settings = (
         "Its articulated-body algorithm, or its proximal constrained dynamics for closed loops, compiled and called "
-        "from Python. It has no integrator: SciPy's DOP853 steps it, in Python, so that on small scenes most of the "
-        "time is SciPy's and Python's; events and controllers are in a loop in Python around it. No contacts. Outputs "
-        "are computed after the timed solve."
+        "from Python. It has no integrator: SciPy's DOP853 steps it, or Radau where joints are stiff, in Python, so "
+        "that on small scenes most of the time is SciPy's and Python's; events and controllers are in a loop in Python "
+        "around it. No contacts. Outputs are computed after the timed solve."
     )
     library = Library("Pinocchio", "pinocchio", "pin")
     capabilities = TreeCapabilities(get_args(ClosureKind), KNOWN, screws=True, couplings=True, armatures=True)
-    ladder, methods = RTOL_LADDER, METHODS
+    methods = METHODS
 
     def own_refusals(self, scene: Scene) -> Iterator[str]:
         if len(scene.hinges) > MOST_JOINTS:
             yield f"{len(scene.hinges)} hinges are too many: {WHY_NOT_MORE}"
+
+    def efforts_for(self, scene: Scene, duration_s: float) -> tuple[Effort, ...]:
+        """Tolerances of an explicit method, of an implicit one for stiff joints; the loop of events has none."""
+        return RTOL_LADDER if is_hybrid(scene) else ladder_for(scene, duration_s)
 
     def model(self, scene: Scene) -> Model:
         from crosscheck.engines.pinocchio.model import compiled

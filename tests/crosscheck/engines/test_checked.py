@@ -43,7 +43,8 @@ class Lasting(Fake):
 
 def having(**collections: list[Any]) -> Any:
     """A scene as far as `supports` looks at it."""
-    return SimpleNamespace(**{"connectors": (), "couplings": (), "controllers": (), "events": ()} | collections)
+    nothing = dict.fromkeys(("connectors", "couplings", "controllers", "events", "total_loads"), ())
+    return SimpleNamespace(**nothing | collections)
 
 
 def test_the_name_is_the_engines() -> None:

@@ -5,12 +5,14 @@ import pytest
 from msgspec.structs import replace
 
 from crosscheck.engines.contract import Effort, Run
+from crosscheck.engines.native import NativeEngine
 from crosscheck.engines.opensim.engine import MASSLESS
+from crosscheck.engines.pinocchio.engine import PinocchioEngine
 from crosscheck.engines.registry import engines
 from crosscheck.engines.trajectories import continuous
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.functions import Constant, Function, Pulse, Sine, SpinUp
-from flexmb.scene.schema import BeamStation, Scene
+from flexmb.scene.schema import BeamStation, Scene, SceneEvent
 from tests.crosscheck.engines.peers import installed
 from tests.crosscheck.engines.random_scenes import random_scene
 
@@ -273,3 +275,35 @@ def test_opensim_drives_what_has_no_inertia(kind: str, mass: float) -> None:
     assert ours.markers["tool"].acceleration == pytest.approx(theirs.markers["tool"].acceleration, abs=1e-13)
     assert ours.drives["drive"] == pytest.approx(theirs.drives["drive"], abs=1e-14)
     assert ours.loads["pin"] == pytest.approx(theirs.loads["pin"], abs=1e-13)
+
+
+def finger(damping: float) -> Scene:
+    """Two links of a hand, of grams, whose joints have a damper."""
+    tree = SceneBuilder("finger", gravity=(0.0, 0.0, -9.81))
+    for name, parent, at in (("one", "ground", 0.0), ("two", "one", 0.05)):
+        tree.rigid_body(name, mass=0.02, com=(0.02, 0.0, 0.0), inertia=(1e-6, 2e-6, 2e-6))
+        place = (at, 0.0, 0.0)
+        tree.revolute(
+            f"to {name}", parent, name, parent_position=place, axis=(0.0, 1.0, 0.0), damping=damping, rate=0.5
+        )
+    return tree.marker("tip", "two", offset=(0.05, 0.0, 0.0)).scene()
+
+
+def test_pinocchio_steps_stiff_joints_by_an_implicit_method() -> None:
+    """A hand of 16 such joints took minutes for 0.2 s by an explicit one; weak dampers change nothing."""
+    pytest.importorskip("pinocchio")
+    pinocchio, run, scene = PinocchioEngine(), Run(np.linspace(0.0, 0.5, 6)), finger(3.0)
+    assert {effort.method for effort in pinocchio.efforts_for(finger(1e-4), 0.5)} == {"DOP853"}
+    coarse, *_, fine = pinocchio.efforts_for(scene, 0.5)
+    assert {coarse.method, fine.method} == {"Radau"}
+    latched = replace(scene, events=(SceneEvent(name="stop", watch="time", level=0.1, actions=()),))
+    assert {effort.method for effort in pinocchio.efforts_for(latched, 0.5)} == {"DOP853"}
+    ours = NativeEngine().compile(scene).simulate(run, Effort("tolerance", 1e-10, "radau5"))
+    theirs = pinocchio.compile(scene).simulate(run, fine)
+    assert np.abs(ours.markers["tip"].position - theirs.markers["tip"].position).max() < 1e-9
+    assert np.ptp(ours.markers["tip"].position[:, 2]) > 1e-5
+    model, short = pinocchio.compile(scene), Run(np.linspace(0.0, 0.005, 2))
+    implicit, explicit = (
+        model.simulate(short, Effort("tolerance", 1e-6, method)).evaluations for method in ("Radau", "DOP853")
+    )
+    assert 5 * implicit < explicit
