@@ -120,6 +120,9 @@ ABILITIES: dict[str, Callable[[Kind], object]] = {
     "files of runs and scenes": _files,
     "`equilibrium`": lambda kind: fm.equilibrium(kind.scene),
     "`linearize`": lambda kind: fm.linearize(kind.scene),
+    "`linearize_sampled`": lambda kind: fm.linearize_sampled(
+        kind.scene, None if any(each.period_s for each in kind.scene.controllers) else 0.01
+    ),
     "`base_excitation`": _rests_on_ground,
     "`acceleration_derivatives`": lambda kind: _of_state(kind, "acceleration_derivatives"),
     "`evaluation_derivatives`": lambda kind: _of_state(kind, "evaluation_derivatives"),
