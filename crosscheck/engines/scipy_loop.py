@@ -14,7 +14,6 @@ from crosscheck.engines.contract import Effort, Run, Snapshot, Trajectory
 from crosscheck.engines.functions_of_time import breaks_between, scene_functions
 from crosscheck.engines.linear.matrices import LinearMatrices
 from crosscheck.engines.linear.outputs import NOTHING, LinearOutputs, outputs
-from crosscheck.engines.pace import pace
 from crosscheck.engines.trajectories import stack
 from flexmb.scene.functions import Function
 from flexmb.scene.schema import Scene
@@ -33,15 +32,6 @@ def absolute_tolerance(rtol: float) -> float:
 
 METHODS = ("DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA")  # of `solve_ivp`
 RTOL_LADDER = tuple(Effort("tolerance", rtol, "DOP853") for rtol in (1e-6, 1e-8, 1e-10, 1e-12))
-STIFF_LADDER = tuple(Effort("tolerance", rtol, "Radau") for rtol in (1e-6, 1e-8, 1e-10))
-STIFF = 1e5
-"""Radians or decay times of the fastest spring or damper in a run, from which an explicit method would make tens of
-thousands of steps for stability alone: joints with damping or friction and hardly any inertia."""
-
-
-def ladder_for(scene: Scene, duration_s: float) -> tuple[Effort, ...]:
-    """The tolerances for a run of a rigid tree, of an implicit method where it is stiff."""
-    return STIFF_LADDER if pace(scene, duration_s).elastic * duration_s > STIFF else RTOL_LADDER
 
 
 class EquationsOfMotion(Protocol):

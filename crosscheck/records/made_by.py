@@ -30,7 +30,7 @@ RECORDING = (
     "crosscheck.engines.answers",
     "crosscheck.engines.contract",
     "crosscheck.engines.linear.outputs",
-    "crosscheck.engines.trajectories",
+    "crosscheck.engines.total_loads",
     "crosscheck.engines.trajectories",
     "crosscheck.records.kinds",
     "crosscheck.records.packing",

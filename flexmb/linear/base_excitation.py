@@ -21,7 +21,7 @@ from scipy.linalg import eigh
 from flexmb.kept import kept
 from flexmb.linear.equations import built, equations_of
 from flexmb.linear.linear_model import LinearModel
-from flexmb.linear.linearize import linearize
+from flexmb.linear.linearize import linearize, seen_model
 from flexmb.linear.observed import observed
 from flexmb.scene.check import check_scene
 from flexmb.scene.connectors import BetweenNodes
@@ -135,7 +135,7 @@ def base_excitation(system: System | Scene, state: State | None = None, *, held:
     check_scene(shaken)
     moved = compile(shaken)
     there = _there(own, moved, state)
-    falling = linearize(moved, there, held=held)
+    falling, _ = seen_model(moved, there, held)
     standing = compile(replace(shaken, loads=(*shaken.loads, *_holding(base, falling))))
     return _by_acceleration(own, standing, base, mass, linearize(standing, there, held=held), state)
 
@@ -168,6 +168,7 @@ def _shaken(scene: Scene, mass: float) -> tuple[Scene, str]:
         hinges=(hinge, *(on_base(item, "parent") for item in scene.hinges)),
         closures=tuple(on_base(item, "body_a", "body_b") for item in scene.closures),
         connectors=connectors,
+        total_loads=(),  # of joints that are not on the ground any more
         sensors=(*scene.sensors, *sensors, *loads),
     ), base
 

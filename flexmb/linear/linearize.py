@@ -30,6 +30,13 @@ def linearize(system: System | Scene, state: State | None = None, *, held: bool 
     limit, or a connector just at a stop or slack, NotImplementedError for sampled controllers and closures on bodies of
     level "ruthless", ValueError or TypeError for a state that does not belong to this system or leaves closures open.
     """
+    model, seen = seen_model(system, state, held)
+    warn(seen)
+    return model
+
+
+def seen_model(system: System | Scene, state: State | None, held: bool) -> tuple[LinearModel, WatchedStates]:
+    """The model of `linearize`, and what watches of accuracy look at."""
     if isinstance(system, Scene) and system.controllers:
         system = built(system)
     if isinstance(system, System) and system.scene.controllers:
@@ -45,14 +52,12 @@ def linearize(system: System | Scene, state: State | None = None, *, held: bool 
             return linear_model(*seen[-1])
 
         model, _ = closed_model(loop, state, None, of_motion)
-        warn(looked_at(seen))
-        return model
+        return model, looked_at(seen)
     equations, state = entering(system, state)
     equations = equations.held(state.t) if held else equations
     if held or equations.system.constraints is None:  # states that enter for a closed chain are on its functions
         state = equations.on_functions(state)
-    warn(looked_at([(equations, state)]))
-    return linear_model(equations, state)
+    return linear_model(equations, state), looked_at([(equations, state)])
 
 
 def looked_at(states: Sequence[tuple[Equations, State]]) -> WatchedStates:

@@ -45,8 +45,8 @@ def combine(parts: Sequence[Inertia]) -> Inertia:
 
 def combined(mass: Real, com: Real, inertia: Real) -> Inertia:
     """Bodies of masses (n,), mass centres (n,3) and inertias (n,3,3) about these as one, by Steiner's theorem."""
-    total = float(mass.sum())
-    centre: Real = mass @ com / (total or 1.0)
+    total = float(sum(mass.tolist()))
+    centre: Real = np.sum(mass[:, None] * com, axis=0) / (total or 1.0)  # one after the other, as whoever adds by hand
     return Inertia(total, centre, np.sum(inertia + steiner(mass, com - centre), axis=0))
 
 

@@ -44,6 +44,8 @@ ANSWERS = {
     "equilibrium": fm.equilibrium,
     "equilibrium_path": lambda scene: fm.equilibrium_path(scene, NUMBER, [0.5, 7.0]),
     "linearize": lambda scene: fm.linearize(scene, quietly(fm.equilibrium, fm.compile(scene))),
+    "linearize_sampled": lambda scene: fm.linearize_sampled(scene, 0.01, quietly(fm.equilibrium, fm.compile(scene))),
+    "base_excitation": lambda scene: fm.base_excitation(scene, quietly(fm.equilibrium, fm.compile(scene))),
     "steady_spin": lambda scene: fm.steady_spin(scene, "hub", 0.01),
     "campbell": lambda scene: fm.campbell(scene, "hub", [0.0, 0.01]),
     "sensitivities": lambda scene: fm.sensitivities(scene, 2.0, [NUMBER], WATCHED, samples=21, **RUN),
@@ -58,6 +60,7 @@ OTHERS = {
     "save_scene": "writes the scene",
     "open_loop": "returns another scene",
     "fit": "does not speak of trial values",
+    "stability_map": "warns as linearize_sampled does, at every pair of values",
     "advise": "measures models against finer ones",
 }
 QUICK = ("simulate", "simulate_batch", "equilibrium")
