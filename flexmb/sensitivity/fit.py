@@ -240,18 +240,19 @@ def _searched(problem: _Problem, start: Real, limits: tuple[Real, Real], noise: 
 
     x = start
     for _ in range(1 if noise is not None else REWEIGHTED):
-        solution = least_squares(
-            residuals,
-            x,
-            jacobian,
-            limits,
-            method="trf",
-            x_scale="jac",
-            max_nfev=max_runs,
-            ftol=FLAT,
-            xtol=FLAT,
-            gtol=None,
-        )
+        with np.errstate(invalid="ignore", divide="ignore"):  # of directions on which nothing depends, named below
+            solution = least_squares(
+                residuals,
+                x,
+                jacobian,
+                limits,
+                method="trf",
+                x_scale="jac",
+                max_nfev=max_runs,
+                ftol=FLAT,
+                xtol=FLAT,
+                gtol=None,
+            )
         x, before = solution.x, weights
         if noise is not None:
             break
