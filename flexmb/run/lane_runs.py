@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
+from flexmb.control.wiring import wired
 from flexmb.entry import lanes
 from flexmb.integrate.control import ACCEPTED, COUNTS, EVALUATIONS, REJECTED, SAMPLES, STOP
 from flexmb.integrate.dop853_lanes import dop853_lanes
@@ -33,7 +34,6 @@ from flexmb.run.interruption import Interrupted, Stop
 from flexmb.run.propagate import NO_STATES, PARTS, Integration, kept_for_watches, recursion, room_for
 from flexmb.run.simulate import Made, run_of_many
 from flexmb.run.times import segment_ends
-from flexmb.scene.control import UserLaw
 from flexmb.system import algorithms
 from flexmb.system.batch import Batch, LaneTables, in_threads
 from flexmb.system.system import System
@@ -97,7 +97,7 @@ class BatchRun:
         """Run the first n copies."""
         scene = self._batch.systems[0].scene
         if scene.events or scene.controllers:
-            calls_python = any(isinstance(controller, UserLaw) for controller in scene.controllers)
+            calls_python = bool(scene.controllers) and bool(wired(self._batch.systems[0]).laws)
             in_threads(self._by_themselves, range(n), 1 if calls_python else threads)
             return
         in_lanes = self._batch.in_lanes and self._settings.method in _IN_LANES

@@ -10,10 +10,12 @@ import pytest
 from msgspec.structs import replace
 
 import flexmb as fm
+from flexmb.run import lane_runs
 from flexmb.run.interruption import Stop, interruptible
 from flexmb.run.simulate_batch import simulate_batch
 from flexmb.scene.build import SceneBuilder
 from tests.bounds import gamma
+from tests.flexmb.control.scenes import rotor
 
 STEP = 0.01
 T_END = 0.5
@@ -267,3 +269,17 @@ def test_ctrl_c_reaches_runs_in_other_threads():
     done.start()
     done.join(5.0)
     assert late[0] == 1
+
+
+@pytest.mark.parametrize(("law", "threads"), [("compiled", 3), ("called", 1)])
+def test_only_laws_in_python_keep_copies_in_one_thread(law, threads, monkeypatch):
+    if law == "compiled":
+        scene = fm.load_scene("cases/spacecraft/deploy_and_slew/scene.toml")
+    else:
+        given = {"inputs": ("angle",), "parameters": (2.0,)}
+        scene = rotor(fm.UserLaw(name="law", function="tests.flexmb.control.laws:plainly_proportional", **given))
+    used = []
+    real = lane_runs.in_threads
+    monkeypatch.setattr(lane_runs, "in_threads", lambda work, parts, n: (used.append(n), real(work, parts, n)))
+    runs = simulate_batch([scene] * 3, 0.05, samples=2, threads=3, rtol=1e-6, atol=1e-8)
+    assert runs.finished and used == [threads]
