@@ -119,8 +119,7 @@ def base_excitation(system: System | Scene, state: State | None = None, *, held:
     """The linear model about a state (default: the initial one) by the acceleration of the ground, exactly.
 
     Everything that hangs on "ground" by hinges, closures and connectors is shaken with it; loads and gravity keep their
-    directions in World. `state`, `held` and what is raised: as of `linearize`. ValueError for a scene in which nothing
-    stands on the ground.
+    directions in World. `state`, `held`, warnings and what is raised: as of `linearize`.
     """
     if not isinstance(system, System | Scene):
         raise TypeError(f"a System or a Scene is needed, not {type(system).__name__}")

@@ -27,6 +27,8 @@ STANDARD_GRAVITY = 9.80665
 """m/s^2 in a g."""
 RELATIVE = 1e-9
 """Of a mean square, to which it is integrated."""
+MOST_ERROR = 1e-6
+"""Of a mean square: what is known less well, because intervals have run out, is refused rather than told."""
 _ROUGHLY = (0.1, 0.01)
 MOST_INTERVALS = 20_000
 """Of one integral: half a minute for a model of a hundred states."""
@@ -92,11 +94,10 @@ class SpectralDensity:
     def rms(self) -> float:
         """The root mean square of the input, in closed form: of each line, f1 s1 (r^(m+1) - 1) / (m + 1)."""
         f, s = self.frequencies_hz, self.values
-        octaves = np.log(f[1:] / f[:-1])
-        power = np.log(s[1:] / s[:-1]) / octaves + 1.0
-        x = power * octaves
+        widths = np.log(f[1:] / f[:-1])
+        x = np.log(s[1:] / s[:-1]) + widths  # (m + 1) log r
         grown = np.where(np.abs(x) < 1e-12, 1.0, np.expm1(x) / np.where(x == 0.0, 1.0, x))
-        return float(np.sqrt(np.sum(f[:-1] * s[:-1] * octaves * grown)))
+        return float(np.sqrt(np.sum(f[:-1] * s[:-1] * widths * grown)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,7 +195,8 @@ def random_response(
     densities: for inputs by their names a `SpectralDensity`, or its points (F,2) of frequency (Hz) and one-sided
     density (the square of the input's unit per Hz). S_y = sum |H|^2 S, with all modes; mean squares are integrated to
     1e-9, divided at every resonance. KeyError for names that do not exist, ValueError for densities that are not
-    positive, for an unstable model, and for a mode without damping inside the band, TypeError for no linear model.
+    positive, for an unstable model, and for a mode without damping inside the band, TypeError for no linear model,
+    ArithmeticError where a mean square is not known to 1e-6.
     """
     if not isinstance(model, LinearModel):
         raise TypeError(f"a LinearModel is needed, not {type(model).__name__}: see linearize and base_excitation")
@@ -228,6 +230,11 @@ def random_response(
         integral, error = found[0] * size, float(found[1]) * size
         size = np.maximum(integral, np.tile(STILL**2 * most_of(units, integral[: len(used)]), 2))
         size[size == 0.0] = 1.0
+    if used and not float(found[1]) <= MOST_ERROR:
+        raise ArithmeticError(
+            f"the mean squares are known to {float(found[1]):.1e} only after {MOST_INTERVALS} intervals: narrow the "
+            "band of the densities, or ask for fewer outputs at once"
+        )
     rms, doubt, crossings = (np.full(len(rows), np.nan) for _ in range(3))
     square, second = integral[: len(used)], integral[len(used) :]
     rms[determined] = np.sqrt(square)

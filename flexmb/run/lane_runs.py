@@ -39,7 +39,7 @@ from flexmb.system.batch import Batch, LaneTables, in_threads
 from flexmb.system.system import System
 from flexmb.tables.arrays import Constants
 from flexmb.tables.state import DynamicsError
-from flexmb.tables.status import INTERRUPTED, MAX_STEPS, NONFINITE, NOT_POSITIVE_DEFINITE, OK
+from flexmb.tables.status import CLOSURE_OPEN, INTERRUPTED, MAX_STEPS, NONFINITE, NOT_POSITIVE_DEFINITE, OK
 from flexmb.typing import Index, Real
 
 if TYPE_CHECKING:
@@ -234,23 +234,34 @@ class BatchRun:
                 system, y = self._batch.system(copy), found.y[copy]
                 try:
                     state = system.state(y[:n], y[n:-1])
+                except ValueError as error:  # numbers that are not finite, or a zero quaternion
+                    found.status[copy], self.whole[copy] = NONFINITE, WholeRun(str(error), (), {}, ())
+                    continue
+                try:
                     made = run_of_many(system, self._times, self._settings, "articulated", state)
                 except Interrupted:
                     found.status[copy] = INTERRUPTED
                     return
-                except (ValueError, DynamicsError) as error:  # of this copy's state
-                    found.status[copy], self.whole[copy] = NONFINITE, WholeRun(str(error), (), {}, ())
+                except DynamicsError as error:  # of this copy's start
+                    found.status[copy], self.whole[copy] = int(error.status), WholeRun(str(error), (), {}, ())
+                    continue
+                except ValueError as error:  # its start does not close the closures
+                    if not system.scene.constraints:
+                        raise
+                    found.status[copy], self.whole[copy] = CLOSURE_OPEN, WholeRun(str(error), (), {}, ())
                     continue
                 self._take(copy, system, made)
 
     def _take(self, copy: int, system: System, made: Made) -> None:
-        """Keep what such a run came to; an output after events at its end is left out."""
+        """Keep what such a run came to: at each output time the last row, which is after events at that time."""
         run, found, cost = made.trajectory, self._found, made.trajectory.statistics
-        last = int(np.searchsorted(self._times, run.t[-1], side="right")) if len(run.t) else 0
-        rows = slice(0, min(last, len(run.t)))
-        found.out[copy, rows] = np.column_stack([run.q, run.u, run.work])[rows]
+        reached = (
+            self._times[: np.searchsorted(self._times, run.t[-1], side="right")] if len(run.t) else self._times[:0]
+        )
+        rows = np.searchsorted(run.t, reached, side="right") - 1
+        found.out[copy, : len(rows)] = np.column_stack([run.q, run.u, run.work])[rows]
         counts = found.counts[copy]
-        counts[SAMPLES], counts[EVALUATIONS] = rows.stop, cost.evaluations
+        counts[SAMPLES], counts[EVALUATIONS] = len(rows), cost.evaluations
         counts[ACCEPTED], counts[REJECTED] = cost.accepted_steps, cost.rejected_steps
         found.status[copy], found.stopped_at[copy] = int(run.status), run.stopped_at
         doubts = tuple(str(warning) for warning in made.warned)

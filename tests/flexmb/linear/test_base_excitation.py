@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 import flexmb as fm
 from flexmb.cli import app
 from flexmb.linear import base_excitation as rooms
+from flexmb.linear import random_response
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.files import load_scene
 from flexmb.scene.shapes import beam_section
@@ -281,3 +282,11 @@ def test_the_command(tmp_path):
     assert table.shape[1] == 4 and np.all(np.isfinite(table))
     for wrong in (["--density", "20"], ["--unit", "mm", "--density", "1:1,2:1"], ["--axis", "w"], ["--at", "rest"]):
         assert CliRunner().invoke(app, [*command, *wrong]).exit_code == 2
+
+
+def test_integrals_that_are_not_known_are_refused(monkeypatch):
+    monkeypatch.setattr(random_response, "MOST_INTERVALS", 1)
+    monkeypatch.setattr(random_response, "resonances", lambda model, low, high: np.zeros(0))
+    model = fm.base_excitation(standing()).model
+    with pytest.raises(ArithmeticError, match="narrow the band"):
+        fm.random_response(model, {"base.x": [(1.0, 1.0), (1e4, 1.0)]}, ("load:root.force.x",))

@@ -283,3 +283,15 @@ def test_only_laws_in_python_keep_copies_in_one_thread(law, threads, monkeypatch
     monkeypatch.setattr(lane_runs, "in_threads", lambda work, parts, n: (used.append(n), real(work, parts, n)))
     runs = simulate_batch([scene] * 3, 0.05, samples=2, threads=3, rtol=1e-6, atol=1e-8)
     assert runs.finished and used == [threads]
+
+
+def test_the_last_row_is_after_events_at_the_end():
+    """As of a single run: an impact at the end has turned the speed."""
+    hit = fm.SceneEvent(name="hit", watch="time", level=0.3, actions=(fm.Impact(coordinate="h1.rotation"),))
+    system = fm.compile(replace(pendulum(), events=(hit,)))
+    runs = simulate_batch([system.scene], 0.3, samples=4, **FINE)
+    alone = fm.simulate(system, 0.3, samples=4, **FINE)
+    [event] = runs.events[0]
+    np.testing.assert_array_equal(runs.u[0], alone.u)
+    np.testing.assert_array_equal(runs.u[0, -1], event.after.u)
+    assert np.any(event.after.u != event.before.u)
