@@ -72,8 +72,11 @@ def _tables(field: StrainField, number: Index, first: int, body: a.Record, m: in
     table["before"] = np.where(field.before[kept] < 0, -1, first + number[field.before[kept]])
     table["gauss"] = -1
     table["gauss"][number[field.gauss]] = np.arange(len(field.gauss))
-    for name in ("position", "tangent"):
-        table[name] = getattr(field, name)[kept]
+    base, own = field.base[kept], field.own[kept]
+    table["base"] = np.where(base < 0, -1, first + number[base])
+    table["own_start"], table["own_stop"] = own.T
+    table["arm"] = field.position[kept] - np.where(base[:, None] < 0, 0.0, field.position[base])
+    table["tangent"] = field.tangent[kept]
     rows = np.zeros((len(kept), 12, m))
     rows[..., : field.mode_count] = field.rows[kept].reshape(len(kept), 12, -1)
     axis = field.axis
@@ -85,4 +88,7 @@ def _tables(field: StrainField, number: Index, first: int, body: a.Record, m: in
         turn, _ = field.shapes()
         rows[:, 3 * WHOLE : 3 * STRETCH] = 0.0
         rows[:, ANGLE, : field.mode_count] = np.einsum("a,jam->jm", axis, turn[kept])
-    return table, field.weight[kept], rows
+    weight = np.zeros((len(kept), int(np.max(own[:, 1] - own[:, 0]))))
+    for j, (start, stop) in enumerate(own):
+        weight[j, : stop - start] = field.weight[kept[j], start:stop]
+    return table, weight, rows

@@ -12,7 +12,7 @@ from flexmb.jit.kernel import kernel
 from flexmb.levels import full
 from flexmb.levels.level import FidelityLevel, InertiaTables, six
 from flexmb.levels.masses import modal_masses
-from flexmb.levels.summed_point import add_point, clear_inertia
+from flexmb.levels.summed_point import add_points, clear_inertia
 from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.modal.integrals import TurningPoints, modal_integrals
 from flexmb.typing import Real
@@ -23,8 +23,7 @@ def inertia_and_bias(c, w, k):
     """The sum over all points of body k, after modal masses that are zero unless a matrix was added to them."""
     modal_masses(c, w, k)
     clear_inertia(c, w, k)
-    for j in range(c.body[k].point_start, c.body[k].point_stop):
-        add_point(c, w, k, j)
+    add_points(c, w, k)
 
 
 def tables(model: FlexibleModel, wheels: int) -> InertiaTables:

@@ -12,7 +12,7 @@ from flexmb.jit.strips import ROW, put, put_across, strip, width
 from flexmb.levels.affine_integrals import axial_vector, columns_of, sum_integrals, symmetric_part, table_of_products
 from flexmb.levels.level import FidelityLevel, InertiaTables, six
 from flexmb.levels.masses import modal_masses
-from flexmb.levels.summed_point import add_point
+from flexmb.levels.summed_point import add_points
 from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.modal.integrals import ModalIntegrals, modal_integrals
 from flexmb.spatial.inertia import rigid_inertia, store_inertia
@@ -39,8 +39,7 @@ def inertia_and_bias(c, w, k):
     """Modal masses, then coupling and bias of the polynomial part, then the summed points."""
     modal_masses(c, w, k)
     coupling_and_bias(c, w, k)
-    for j in range(c.body[k].point_start, c.body[k].point_stop):
-        add_point(c, w, k, j)
+    add_points(c, w, k)
 
 
 @helper

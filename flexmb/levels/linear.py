@@ -18,7 +18,7 @@ import numpy as np
 
 from flexmb.jit.kernel import helper, kernel
 from flexmb.levels.level import FidelityLevel, InertiaTables, six, sixes
-from flexmb.levels.summed_point import add_point
+from flexmb.levels.summed_point import add_points
 from flexmb.modal.first_order import FirstOrder, first_order
 from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.modal.integrals import TurningPoints
@@ -55,8 +55,7 @@ def inertia_and_bias(c, w, k):
     torque = sub(cross(omega, add(sym_times(j, omega), swirl)), scale(2.0, sym_times(b, omega)))
     store3(w.body[k].force, 0, torque)
     store3(w.body[k].force, 3, cross(omega, add(cross(omega, s), scale(2.0, momentum))))
-    for i in range(c.body[k].point_start, c.body[k].point_stop):
-        add_point(c, w, k, i)
+    add_points(c, w, k)
 
 
 @helper

@@ -142,17 +142,22 @@ def _bend(c, w, k, j, R, omega, alpha):
 
 @helper
 def _place(c, w, k, j):
-    """Position of section j, its velocity and acceleration and L: the tangents at the Gauss points, integrated."""
-    weight = c.section_weight[j]
-    r, a = vec3(c.section[j].position, 0), ZERO3
-    for g in range(c.body[k].gauss_points):
-        r = axpy(weight[g], vec3(w.tangent[g].change, 0), r)
-        a = axpy(weight[g], vec3(w.tangent[g].acceleration, 0), a)
+    """Position of section j, its velocity and acceleration and L: those of its base, and the tangents at the Gauss
+    points of its interval, integrated."""
+    weight, i, first, stop = c.section_weight[j], c.section[j].base, c.section[j].own_start, c.section[j].own_stop
+    r, a = vec3(c.section[j].arm, 0), ZERO3
+    if i >= 0:
+        r, a = add(r, vec3(w.section[i].r, 0)), vec3(w.section[i].a, 0)
+    for g in range(first, stop):
+        r = axpy(weight[g - first], vec3(w.tangent[g].change, 0), r)
+        a = axpy(weight[g - first], vec3(w.tangent[g].acceleration, 0), a)
     v = ZERO3
     for n in range(0, c.body[k].modes, width(w)):
         L = ZERO3
-        for g in range(c.body[k].gauss_points):
-            L = axpy(weight[g], strips3(w, w.tangent_mode[g], 0, n), L)
+        if i >= 0:
+            L = strips3(w, w.section_mode[i], 3, n)
+        for g in range(first, stop):
+            L = axpy(weight[g - first], strips3(w, w.tangent_mode[g], 0, n), L)
         put3(w, w.section_mode[j], 3, n, L)
         v = axpy(strip(w, w.etad[k], n), L, v)
     store3(w.section[j].r, 0, r)

@@ -16,7 +16,7 @@ import numpy as np
 from flexmb.jit.kernel import helper, kernel
 from flexmb.levels import full
 from flexmb.levels.level import FidelityLevel, InertiaTables
-from flexmb.levels.summed_point import add_point
+from flexmb.levels.summed_point import add_point, complete_masses
 from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.modal.integrals import modal_integrals, stacked, still_points
 from flexmb.spatial.inertia import add_inertia, rigid_inertia, store_inertia
@@ -42,6 +42,7 @@ def inertia_and_bias(c, w, k):
             add_point(c, w, k, j)
         else:
             _add_mass(c, w, k, j)
+    complete_masses(c, w, k)
 
 
 @helper

@@ -30,8 +30,27 @@ def clear_inertia(c, w, k):
 
 
 @helper
+def add_points(c, w, k):
+    """Add the points of body k."""
+    for j in range(c.body[k].point_start, c.body[k].point_stop):
+        add_point(c, w, k, j)
+    complete_masses(c, w, k)
+
+
+@helper
+def complete_masses(c, w, k):
+    """The modal masses below the strips of the diagonal, which `add_point` leaves out, from those above."""
+    for n in range(width(w), c.body[k].modes):
+        for i in range(n - n % width(w)):
+            w.pff[k, n, i] = w.pff[k, i, n]
+
+
+@helper
 def add_point(c, w, k, j):
-    """Add point j to body k: mass mu with its centre at R p from the point, inertia R J R' about that centre."""
+    """Add point j to body k: mass mu with its centre at R p from the point, inertia R J R' about that centre.
+
+    Of the modal masses what is above the diagonal, and the strips on it; `complete_masses` adds the rest.
+    """
     nm = c.body[k].modes
     omega = vec3(w.body[k].velocity, 0)
     mass = c.point[j].mass
@@ -77,5 +96,5 @@ def add_point(c, w, k, j):
     for n in range(nm):
         W, L = column6(w.point_mode, n)
         momentum = sym_times(inertia, W), scale(mass, L)
-        for i in range(0, nm, width(w)):
+        for i in range(n - n % width(w), nm, width(w)):
             put(w, w.pff[k, n], i, plus6(strip(w, w.pff[k, n], i), momentum, strips6(w, w.point_mode, i)))

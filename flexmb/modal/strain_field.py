@@ -40,6 +40,10 @@ class StrainField:
     columns are the q Gauss points; gauss (q,): their numbers. The first `steps` sections are these points and the ends
     of the intervals that they lie in; others turn from these. columns (p,m): the modes in Legendre's polynomials, in
     the order of `strain_field`; None where they are these polynomials.
+
+    base (n,): the section at the inboard end of the interval in which a section lies, -1 for the root; own (n,2): the
+    first of the Gauss points of that interval, and that after its last. What the points before it add to a section they
+    add to its base, so that a position is that of the base and an integral over the own points.
     """
 
     x: Real
@@ -50,6 +54,8 @@ class StrainField:
     weight: Real
     gauss: Index
     steps: int
+    base: Index
+    own: Index
     columns: Real | None = None
 
     @property
@@ -138,6 +144,10 @@ def strain_field(body: BeamBody, places: Real, hung_from: Index | None = None) -
     h = x - left
     position, rotation = rest_sections(body, x)
     shapes = _Polynomials(body)
+    gauss_at, ends = np.searchsorted(main, gauss), np.searchsorted(main, breaks[1:-1])
+    within = np.searchsorted(breaks[1:-1], x, side="right")  # number of the interval of each section
+    within[ends] = np.arange(len(ends))  # the end of an interval is among its own sections
+    first = np.cumsum([0, *(count for _, _, count in grid)])
     rows = np.stack([*_moments(body, left, h, shapes), rotation @ shapes.at(x)[:, :3]], axis=1)
     return StrainField(
         x=x,
@@ -146,8 +156,10 @@ def strain_field(body: BeamBody, places: Real, hung_from: Index | None = None) -
         tangent=rotation[:, :, 0],
         rows=rows,
         weight=_weights(x, grid, gauss),
-        gauss=np.searchsorted(main, gauss),
+        gauss=gauss_at,
         steps=len(main),
+        base=np.concatenate([[-1], ends])[within],
+        own=np.stack([first[within], first[within + 1]], axis=1),
     )
 
 

@@ -109,7 +109,10 @@ PORT = _record(
 SECTION = _record(
     ("before", _I),  # the section from which it is turned, -1 for the root
     ("gauss", _I),  # its number among the Gauss points of its body, -1 for others
-    ("position", _F, (3,)),  # at rest
+    ("base", _I),  # the section at the inboard end of its interval, -1 for the root
+    ("own_start", _I),  # the first of the Gauss points of its interval
+    ("own_stop", _I),
+    ("arm", _F, (3,)),  # from its base, at rest
     ("tangent", _F, (3,)),  # of the axis at rest
 )
 SHAPE = _record(("translation", _F, (3,)), ("rotation", _F, (3,)))  # of second order, at a port or point
@@ -206,7 +209,7 @@ class Constants:
     # (sections,12,m) three integrals of the elastic curvature over the interval, stretch and shears at the section; of
     # bodies that bend about one axis the first row is the angle
     section_rows: Real
-    section_weight: Real  # (sections,Gauss points) integrals up to the section of Lagrange's polynomials
+    section_weight: Real  # (sections,most own Gauss points) integrals from the base of Lagrange's polynomials
     wheel: Record  # (W,) WHEEL
     load: Record  # (L,) LOAD
     connector: Record  # (C,) CONNECTOR

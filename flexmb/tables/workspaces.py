@@ -15,7 +15,7 @@ from flexmb.typing import Record
 def workspace(c: a.Constants, nq: int, nu: int) -> a.Workspace:
     """A workspace of the right sizes; ports have their poses at rest, which are final for bodies without modes."""
     n, _, m = c.mfr.shape
-    together = -(-n // LANES) * LANES
+    together, tangents = -(-n // LANES) * LANES, int(np.max(c.body["gauss_points"], initial=0))
     fields: dict[str, Any] = {
         "q": np.zeros(nq),
         "u": np.zeros(nu),
@@ -35,8 +35,8 @@ def workspace(c: a.Constants, nq: int, nu: int) -> a.Workspace:
         "point_mode": strip_zeros((6, max(m, ROW))),  # at least one strip: eliminations store their sums there
         "section": np.zeros(len(c.section), a.SECTION_STATE),
         "section_mode": strip_zeros((len(c.section), 6, m)),
-        "tangent": np.zeros(c.section_weight.shape[1], a.TANGENT_STATE),
-        "tangent_mode": strip_zeros((c.section_weight.shape[1], 3, m)),
+        "tangent": np.zeros(tangents, a.TANGENT_STATE),
+        "tangent_mode": strip_zeros((tangents, 3, m)),
         "speed": np.zeros(nu, a.SPEED_STATE),
         **connector_states(c),
         "function": np.zeros((len(c.function), 3)),

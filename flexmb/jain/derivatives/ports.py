@@ -12,7 +12,7 @@ only their accelerations act.
 """
 
 from flexmb.jain.derivatives.hinges import to_world
-from flexmb.jain.derivatives.strained import place_section, sum_strains, turn_sections
+from flexmb.jain.derivatives.strained import place_port, sum_strains, turn_sections
 from flexmb.jain.derivatives.strips_of import put3_until, put_strips, put_strips_until, strips_of
 from flexmb.jain.derivatives.tables import (
     BY_ACCELERATION,
@@ -225,7 +225,7 @@ def _move_at_section(c, e, k, i, seeds):
     """Position and V_r of port i, and A_r as `_store_relative` stores it, with the modal accelerations."""
     at = e.section[c.port[i].section]
     turn_sections(c, e, k, seeds)
-    place_section(c, e, k, c.port[i].section)
+    place_port(c, e, k, c.port[i].section)
     omega, alpha, arm = vec3(at.omega, 0), vec3(at.alpha, 0), times(mat3(at.R, 0), vec3(c.port[i].offset, 0))
     swing = cross(omega, arm)
     v = add(vec3(at.v, 0), swing)

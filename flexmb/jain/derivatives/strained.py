@@ -3,9 +3,10 @@
 M_m alpha_m + b_m is applied, never formed. Outward, the sections of `flexmb.levels.section_motion` move with the modal
 accelerations too. The force of each point is then that of its whole acceleration, and by the principle of virtual power
 the row of mode n is the sum of these forces times the velocities that a unit speed of the mode gives their points:
-inward, forces at sections become forces F on the tangents at the Gauss points, by the transposed weights, then torques
-t x F on the sections, which each passes to the one before it. No velocity of a single mode is needed. Points at the
-root sit on no section: they move with the body frame, and no mode moves them.
+inward, forces at sections become forces F on the tangents at the Gauss points of their interval, by the transposed
+weights, and on the section at its inboard end; then torques t x F on the sections, which each passes to the one before
+it. No velocity of a single mode is needed. Points at the root sit on no section: they move with the body frame, and no
+mode moves them.
 
 Only a few modes have derivatives at a time, the `seeds` (first, stop). Sums over all modes are the same along all
 directions: `sum_strains` has found them before, and what the seeds change is added to them. What acts at ports of the
@@ -70,6 +71,8 @@ def strained_force(c, e, k, A, seeds):
     store6(e.body[k].hinge_force, 0, F)
     for n in range(c.body[k].modes):
         e.zf[k, n] = 0.0
+    for j in range(stop - 1, first - 1, -1):
+        _pass_force(c, e, k, j)
     for j in range(first, stop):
         _take_tangent(c, e, k, j)
     for j in range(stop - 1, first - 1, -1):
@@ -182,23 +185,40 @@ def _bend(c, e, k, j, R, omega, alpha, seeds):
     store3(e.tangent[g].acceleration, 0, add(add(cross(alpha, tangent), turning), faster))
 
 
+@sweep
+def place_port(c, e, k, j):
+    """The same, of section j and the bases before it alone: it carries a port."""
+    for i in range(c.body[k].section_start, j):
+        if c.section[i].gauss < 0:
+            place_section(c, e, k, i)
+    place_section(c, e, k, j)
+
+
 @helper
 def place_section(c, e, k, j):
     """Position of section j, its velocity and acceleration; no load yet but what is held there."""
-    r, v, a = vec3(c.section[j].position, 0), ZERO3, ZERO3
-    for i in range(c.body[k].section_start, c.body[k].section_stop):
-        g = c.section[i].gauss
-        if g >= 0 and c.section_weight[j, g] != 0.0:  # none beyond
-            weight = c.section_weight[j, g]
-            r = axpy(weight, vec3(e.tangent[g].change, 0), r)
-            v = axpy(weight, vec3(e.at_section[i].rate, 0), v)
-            a = axpy(weight, vec3(e.tangent[g].acceleration, 0), a)
+    r, v, a, i = vec3(c.section[j].arm, 0), ZERO3, ZERO3, c.section[j].base
+    if i >= 0:
+        r, v, a = add(r, vec3(e.section[i].r, 0)), vec3(e.section[i].v, 0), vec3(e.section[i].a, 0)
+    first = _first_own(c, k, j)
+    for n in range(c.section[j].own_stop - c.section[j].own_start):
+        weight, g = c.section_weight[j, n], c.section[j].own_start + n
+        r = axpy(weight, vec3(e.tangent[g].change, 0), r)
+        v = axpy(weight, vec3(e.at_section[first + n].rate, 0), v)
+        a = axpy(weight, vec3(e.tangent[g].acceleration, 0), a)
     store3(e.section[j].r, 0, r)
     store3(e.section[j].v, 0, v)
     store3(e.section[j].a, 0, a)
     torque, force = vec6(e.at_section[j].held, 0)
     store3(e.at_section[j].force, 0, force)
     store3(e.at_section[j].torque, 0, sub(torque, cross(r, force)))
+    store3(e.at_section[j].pull, 0, ZERO3)
+
+
+@helper
+def _first_own(c, k, j):
+    """The section at the first Gauss point of the interval of section j: they follow its base."""
+    return c.body[k].section_start if c.section[j].base < 0 else c.section[j].base + 1
 
 
 @sweep
@@ -225,15 +245,22 @@ def _load_of_point(c, e, k, j, A):
 
 
 @sweep
+def _pass_force(c, e, k, j):
+    """The force at section j, and at those that it is the base of, to the tangents of its interval and to its base."""
+    force, first = vec3(e.at_section[j].force, 0), _first_own(c, k, j)
+    for n in range(c.section[j].own_stop - c.section[j].own_start):
+        add3(e.at_section[first + n].pull, 0, scale(c.section_weight[j, n], force))
+    if c.section[j].base >= 0:
+        add3(e.at_section[c.section[j].base].force, 0, force)
+
+
+@sweep
 def _take_tangent(c, e, k, j):
     """What the forces at all sections do by the tangent of section j: a torque on it, and the rows of stretch."""
     g = c.section[j].gauss
     if g < 0:
         return
-    force = ZERO3
-    for i in range(c.body[k].section_start, c.body[k].section_stop):
-        if c.section_weight[i, g] != 0.0:
-            force = axpy(c.section_weight[i, g], vec3(e.at_section[i].force, 0), force)
+    force = vec3(e.at_section[j].pull, 0)
     tangent = add(vec3(c.section[j].tangent, 0), vec3(e.tangent[g].change, 0))
     add3(e.at_section[j].torque, 0, cross(tangent, force))
     if c.body[k].stretching:

@@ -126,7 +126,8 @@ AT_SECTION = np.dtype(  # of a beam of level exact
         ("linear", _F, (3,)),
         ("square", _F, (3,)),
         ("rate", _F, (3,)),  # of its tangent, at a Gauss point
-        ("force", _F, (3,)),  # on the section, body axes
+        ("force", _F, (3,)),  # on the section, body axes, and on those of which it is the base
+        ("pull", _F, (3,)),  # on its tangent, at a Gauss point
         ("torque", _F, (3,)),  # on it and on what turns with it
         ("held", _F, (6,)),  # force of what is attached to its ports, with the sign of inertia, about the body origin
     ],

@@ -55,6 +55,21 @@ def test_motion_of_sections_against_jets(name):
         assert np.max(np.abs(own - other)) <= ROUNDING * max(1.0, np.max(np.abs(other)))
 
 
+@pytest.mark.parametrize("name", BEAMS)
+def test_positions_follow_from_the_ends_of_intervals(name):
+    """What the Gauss points before an interval weigh in its sections is what they weigh in its base, and those beyond
+    weigh nothing."""
+    body = body_of(beam(**BEAMS[name], nodes=[s.BeamNode(name="third", x_m=1.0 / 3.0), s.BeamNode(name="in", x_m=0.4)]))
+    field = exact_model(body).field
+    assert field is not None
+    assert len(set(field.base)) == body.modes.pieces
+    for weight, base, (start, stop) in zip(field.weight, field.base, field.own, strict=True):
+        rest = weight.copy()
+        rest[start:stop] = 0.0
+        assert np.max(np.abs(rest - (field.weight[base] if base >= 0 else 0.0))) <= ROUNDING
+        assert base < 0 or field.x[base] <= field.x[field.gauss[start]]
+
+
 def _axial(matrix: Real) -> Real:
     return np.stack([matrix[..., 2, 1], matrix[..., 0, 2], matrix[..., 1, 0]], axis=-1)
 
