@@ -91,17 +91,10 @@ def _pulses(scene: Scene) -> list[tuple[float, float]]:
     ]
 
 
-def refuse_beyond_adjoint(scene: Scene) -> None:
-    """NotImplementedError for scenes whose runs are not passed backwards."""
-    for has, what in (
-        (any(controller.period_s is None for controller in scene.controllers), "continuous controllers"),
-        (watches_signals(scene), "events that watch signals"),
-    ):
-        if has:
-            raise NotImplementedError(
-                f'scene "{scene.name}" has {what}, through which the adjoint does not pass: use `sensitivities`, which '
-                "integrates forwards"
-            )
+def is_passed_backwards(scene: Scene) -> bool:
+    """Whether the adjoint passes runs of a scene: continuous controllers and events that watch signals have no
+    transposes."""
+    return not (any(controller.period_s is None for controller in scene.controllers) or watches_signals(scene))
 
 
 class Admitted(NamedTuple):

@@ -9,6 +9,7 @@ from typing import Unpack
 import numpy as np
 
 from flexmb.building.numbering import speeds_at_least
+from flexmb.integrate.control import ACCEPTED
 from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
 from flexmb.run.simulate import RunSettings, refuse_unknown, run_with_course
@@ -20,9 +21,11 @@ from flexmb.scene.schema import Scene
 from flexmb.scene.sizes import refuse_bytes
 from flexmb.sensitivity.adjoint.run_backwards import Adjoint
 from flexmb.sensitivity.channels import refuse_undetermined, refuse_unknown_outputs
-from flexmb.sensitivity.gate import admitted, refuse_beyond_adjoint
+from flexmb.sensitivity.gate import admitted, is_passed_backwards
+from flexmb.sensitivity.parts import Passage
+from flexmb.sensitivity.readings import Reading, summed_forwards
 from flexmb.sensitivity.scalars import ScalarTerm, terms_of
-from flexmb.sensitivity.sensitivities import METHODS
+from flexmb.sensitivity.sensitivities import METHODS, SHARE
 from flexmb.tables import arguments
 from flexmb.tables.state import DynamicsError
 from flexmb.typing import Real
@@ -34,7 +37,8 @@ class Gradient:
 
     value; parameters (P,) with their values parameter_values (P,); derivatives (P,), each in the unit of the scalar
     over that of the parameter, in SI units; steps: of the run, each of which was made three times and passed backwards
-    once; checkpoints: states that were kept for this; trajectory: the run itself, at its start and end.
+    once; checkpoints: states that were kept for this, none where derivatives were integrated forwards; trajectory: the
+    run itself, at its start and end.
     """
 
     value: float
@@ -72,8 +76,10 @@ def gradient(
 
     The steps of the run are passed backwards with the transposes of their stages, which is the exact derivative of what
     the method computed with these steps; events by the transposes of their derivatives. The cost hardly depends on how
-    many numbers there are. Raises what `sensitivities` raises, and DynamicsError for a run that ends before t_end, and
-    for outputs that redundant closures leave undetermined.
+    many numbers there are. Through continuous controllers and events that watch signals the adjoint does not pass: of
+    such scenes derivatives are integrated forwards, as `sensitivities` does, at its cost. Raises what `sensitivities`
+    raises, and DynamicsError for a run that ends before t_end, and for outputs that redundant closures leave
+    undetermined.
     """
     refuse_unknown("gradient", settings)
     if method not in METHODS:
@@ -81,7 +87,6 @@ def gradient(
         raise ValueError(f'method "{method}" does not integrate derivatives: use {names}')
     t_end, terms = arguments.number("t_end", t_end), terms_of(of)
     check_and_warn(scene, t_end, 0.0)
-    refuse_beyond_adjoint(scene)
     given = Settings(method, **settings).checked(abs(t_end))
     refuse_large_run(scene, 2, given, "articulated")
     n = 2 * speeds_at_least(scene)
@@ -95,9 +100,17 @@ def gradient(
     if not trajectory.finished or trajectory.t[-1] < t_end:
         raise DynamicsError(f"there is no gradient of a run that does not reach t = {t_end:g} s: {trajectory.message}")
     refuse_undetermined(trajectory, [name for term in terms for name in term.channels])
-    adjoint, found = Adjoint(gated, terms, given), gated.numbers
-    derivatives = adjoint(course)
+    reading, found = Reading(terms, course, given), gated.numbers
+    steps, checkpoints = sum(int(leg.raw.counts[ACCEPTED]) for leg in course), 0
+    if is_passed_backwards(scene):
+        adjoint = Adjoint(gated, reading, given)
+        derivatives = adjoint(course)
+        steps, checkpoints = adjoint.cost.steps, adjoint.cost.checkpoints
+    else:
+        scales = np.array([SHARE * number.scale for number in found])
+        passage = Passage(gated, found, scales, given, t_end)
+        derivatives = summed_forwards(passage, reading, course, len(found)) / scales
     return Gradient(
-        adjoint.value, tuple(number.name for number in found), np.array([number.value for number in found]),
-        derivatives, adjoint.cost.steps, adjoint.cost.checkpoints, trajectory,
+        reading.value, tuple(number.name for number in found), np.array([number.value for number in found]),
+        derivatives, steps, checkpoints, trajectory,
     )  # fmt: skip

@@ -5,24 +5,40 @@ Directions belong to numbers of the scene, or to none: those of `flexmb.sensitiv
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from flexmb.control.feedback import Feedback
 from flexmb.integrate.settings import Settings
 from flexmb.parameters.numbers import Number
 from flexmb.run.driver import Leg
-from flexmb.run.propagate import Integration
+from flexmb.run.propagate import Integration, integration
 from flexmb.sensitivity.blocks import Blocks
 from flexmb.sensitivity.gate import Admitted
 from flexmb.sensitivity.jump import EventError, Jumped, jumped
 from flexmb.sensitivity.law_rates import LawRates, event_rates, law_rates
-from flexmb.sensitivity.leg import Course, Variation
+from flexmb.sensitivity.leg import Course, Variation, clock_of_leg
 from flexmb.sensitivity.loops import Loops
 from flexmb.sensitivity.part_scene import ChangeOfValue, PartNumber, PartScene
 from flexmb.sensitivity.systems import Systems
 from flexmb.typing import Real
+
+
+class FollowedPart(NamedTuple):
+    """A part of a run whose state and derivatives, `joined` in states (T,.), are known at times (T,) s.
+
+    feedback: its controllers, whose outputs are read back at these times. before: the state at its end, before events.
+    """
+
+    leg: Leg
+    variation: Variation
+    feedback: Feedback | None
+    times: Real
+    states: Real
+    before: Course
+    is_last: bool
 
 
 class Passage:
@@ -66,6 +82,31 @@ class Passage:
             self._blocks = self._systems.then(leg.system, leg.begin.state, acting, self.after.held, anew)
         self._system = leg.system
         return self._blocks
+
+    def followed(
+        self, course: Sequence[Leg], wanted: Callable[[Leg, bool], Iterable[float]]
+    ) -> Iterator[FollowedPart]:
+        """The parts of a run with the derivatives of their states at their ends and at `wanted` times (s) of a part,
+        which may be the last. Whoever takes one passes its end by `ended` before the next."""
+        loops = None
+        for i, leg in enumerate(course):
+            blocks, start, stop = self.blocks(leg), leg.begin.state.t, leg.raw.t
+            with integration(leg.system, "articulated", 0.0, self._settings.integrator) as solve:
+                is_last = i + 1 == len(course)
+                times = np.unique([start, *wanted(leg, is_last), stop])
+                y, clock = clock_of_leg(solve, leg, times, self._settings)
+                loops = self.loops(solve, loops, is_last and bool(i) and start == stop)
+                variation = Variation(leg, blocks, loops)
+                at = self.begun(variation, y)
+                states = variation.joined(at)[None]
+                if stop > start:
+                    states = variation.integrate(at, clock.times, clock, self._settings)
+                before = Course(leg.raw.y, variation.parted(states[-1]).Y)
+                if loops is not None:
+                    if is_last:
+                        variation.put(float(clock.times[-1]), states[-1])  # controllers act at the end of the run
+                    loops.replay()
+                yield FollowedPart(leg, variation, solve.feedback, clock.times, states, before, is_last)
 
     def loops(self, solve: Integration, before: Loops | None, ends: bool) -> Loops | None:
         """The controllers of a part of the run, None without any; see `Loops`."""

@@ -15,7 +15,6 @@ from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
 from flexmb.parameters.numbers import numbers
 from flexmb.run.driver import Leg
-from flexmb.run.propagate import Integration, integration
 from flexmb.run.simulate import RunSettings, refuse_unknown, run_with_course
 from flexmb.run.times import refuse_large_run, sample_times
 from flexmb.run.trajectory import Trajectory
@@ -25,8 +24,8 @@ from flexmb.scene.schema import Scene
 from flexmb.scene.sizes import refuse_bytes
 from flexmb.sensitivity.channels import Chosen, Seen, channels, chosen, refuse_unknown_outputs
 from flexmb.sensitivity.gate import Admitted, admitted
-from flexmb.sensitivity.leg import Course, Variation, clock_of_leg
-from flexmb.sensitivity.parts import Passage
+from flexmb.sensitivity.leg import Variation
+from flexmb.sensitivity.parts import FollowedPart, Passage
 from flexmb.tables import arguments
 from flexmb.tables.named import brief
 from flexmb.tables.state import DynamicsError
@@ -54,25 +53,11 @@ class Following:
 
     def __call__(self, course: Sequence[Leg]) -> tuple[Real, EventTimes]:
         """Derivatives (T,K,P) of the outputs, and those of the times of events."""
-        loops = None
-        for i, leg in enumerate(course):
-            blocks = self._passage.blocks(leg)
-            with integration(leg.system, "articulated", 0.0, self._settings.integrator) as solve:
-                is_last, stop = i + 1 == len(course), leg.raw.t
-                times = self._times(leg, is_last)
-                y, clock = clock_of_leg(
-                    solve, leg, np.unique([leg.begin.state.t, *self._trajectory.t[times], stop]), self._settings
-                )
-                loops = self._passage.loops(solve, loops, is_last and bool(i) and leg.begin.state.t == stop)
-                variation = Variation(leg, blocks, loops)
-                at = self._passage.begun(variation, y)
-                states = variation.joined(at)[None]
-                if stop > leg.begin.state.t:
-                    states = variation.integrate(at, clock.times, clock, self._settings)
-                before = Course(leg.raw.y, variation.parted(states[-1]).Y)
-                self._see(variation, solve, clock.times, states, times, is_last)
-                variation_after = self._passage.ended(variation, before)
-                self._events += [(crossing.event.name, stop, crossing.dt) for crossing in variation_after.crossings]
+        t = self._trajectory.t
+        for part in self._passage.followed(course, lambda leg, is_last: t[self._times(leg, is_last)]):
+            self._see(part)
+            after = self._passage.ended(part.variation, part.before)
+            self._events += [(crossing.event.name, part.leg.raw.t, crossing.dt) for crossing in after.crossings]
         self._derivatives[np.isnan(self._outputs.values)] = np.nan  # of loads that closures leave undetermined
         return self._derivatives / self._scales, [(name, t, dt / self._scales) for name, t, dt in self._events]
 
@@ -85,23 +70,11 @@ class Following:
         last = int(np.searchsorted(t, stop, side="right" if is_last else "left"))
         return slice(first, last)
 
-    def _see(
-        self,
-        variation: Variation,
-        solve: Integration,
-        times: Real,
-        states: Real,
-        wanted: slice,
-        is_last: bool,
-    ) -> None:
-        """Derivatives of the outputs at the output times of a part of the run, from its states (T,.) at `times`."""
-        loops, system = variation.loops, variation.blocks.system
-        names = {} if solve.feedback is None else solve.feedback.names
-        known = channels(system, names)
-        if loops is not None:
-            if is_last:
-                variation.put(float(times[-1]), states[-1])  # controllers act at the end of the run
-            loops.replay()
+    def _see(self, part: FollowedPart) -> None:
+        """Derivatives of the outputs at the output times of a part of the run."""
+        variation, times, states = part.variation, part.times, part.states
+        known = channels(variation.blocks.system, {} if part.feedback is None else part.feedback.names)
+        wanted = self._times(part.leg, part.is_last)
         places = np.searchsorted(times, self._trajectory.t[wanted])
         for first in range(0, len(places), TOGETHER):
             own = slice(first, first + TOGETHER)

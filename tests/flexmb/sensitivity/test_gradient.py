@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import flexmb as fm
+import flexmb.sensitivity.gradient as gradient_module
 from flexmb.parameters.numbers import Number
 from flexmb.ready import scenes
 from flexmb.sensitivity.adjoint import arc, part
@@ -254,10 +255,8 @@ def test_a_planted_fault_is_noticed(monkeypatch, left_out):
     assert disagreement(arm().scene(), 0.5, NUMBERS, ["elbow.rotation"], method="rk4", step=1e-2) > 1e-6
 
 
-def test_what_the_adjoint_does_not_pass_is_refused():
+def test_scalars_and_runs_without_gradient_are_refused():
     scene, final = arm().scene(), fm.FinalValue("elbow.rotation")
-    with pytest.raises(NotImplementedError, match="continuous controllers"):
-        fm.gradient(controlled().scene(), 0.1, ["bob.mass_kg"], fm.FinalValue("pivot.rotation"))
     with pytest.raises(fm.DynamicsError, match="does not reach t = 2 s"):
         ended = arm().event("over", "elbow.rotation", 0.1, fm.EndRun()).scene()
         fm.gradient(ended, 2.0, ["rod.mass_kg"], final)
@@ -351,3 +350,48 @@ def test_loads_that_closures_leave_undetermined_are_refused():
     for term in (fm.FinalValue(channel), fm.TimeIntegral(channel)):
         with pytest.raises(fm.DynamicsError, match="not determined"):
             fm.gradient(scene, 0.01, by, term)
+
+
+STRIKE = fm.Impact(coordinate="pivot.rotation", restitution=0.6)
+WATCHES = {
+    "sampled": (0.05, "pivot.rotation", -0.2), "continuous": (None, "pivot.rotation", -0.2),
+    "continuous, on a signal": (None, "place[1]", -0.25),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("channel", ["signal.servo[0]", "pivot.rotation.rate", "centre.acceleration.x"])
+@pytest.mark.parametrize("kind", WATCHES)
+def test_integrals_over_an_event_that_moves_under_controllers_against_differences(kind, channel):
+    """What signals held when the event came, and not later, is what the integral gains where the event moves."""
+    period, watch, level = WATCHES[kind]
+    sampling = {} if period is None else {"period": period, "delay": 0.07}
+    scene = controlled(**sampling).event("stop", watch, level, STRIKE).scene()
+    of = [fm.TimeIntegral(channel, squared=True), fm.FinalValue("pivot.rotation")]
+    by = {"stop.level": level, "servo.kp": 1.0}
+
+    def found(values: dict[str, float]) -> fm.Gradient:
+        return fm.gradient(scene.with_values(values), 0.97, list(by), of, **TIGHT)
+
+    exact = found({})
+    assert any(event.name == "stop" for event in exact.trajectory.events)
+    for name, value in by.items():
+        slopes = [
+            (found({name: value + h}).value - found({name: value - h}).value) / (2.0 * h) for h in (2e-4, 1e-4)
+        ]  # fmt: skip
+        assert exact.derivative(name) == pytest.approx((4.0 * slopes[1] - slopes[0]) / 3.0, rel=1e-7, abs=1e-8)
+
+
+def test_forwards_and_backwards_are_one_gradient(monkeypatch):
+    """Of a run that both pass: misfits, integrals and final values through an event that moves."""
+    scene = controlled(period=0.05, delay=0.07).event("stop", "pivot.rotation", -0.2, STRIKE).scene()
+    of = [
+        fm.TimeIntegral("signal.servo[0]", squared=True, level=0.1), fm.FinalValue("work", weight=-2.0),
+        fm.Misfit({"t": [0.0, 0.33, 0.9], "pivot.rotation": [0.1, 0.2, -0.1]}, sigma=0.5),
+    ]  # fmt: skip
+    backwards = fm.gradient(scene, 0.97, [*CONTROLLED, "stop.level"], of, **TIGHT)
+    monkeypatch.setattr(gradient_module, "is_passed_backwards", lambda scene: False)
+    forwards = fm.gradient(scene, 0.97, [*CONTROLLED, "stop.level"], of, **TIGHT)
+    assert forwards.checkpoints == 0 < backwards.checkpoints
+    assert forwards.value == pytest.approx(backwards.value, rel=1e-10)
+    scale = np.max(np.abs(backwards.derivatives))
+    assert np.max(np.abs(forwards.derivatives - backwards.derivatives)) < OTHER_STEPS * scale
