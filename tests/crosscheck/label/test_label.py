@@ -19,7 +19,7 @@ from crosscheck.label.document import FILE, LabelFile, SubjectLabel, label
 from crosscheck.label.evidence import BUDGETS, RESULTS, SPREADS, Exhibits, evidence, of_case, of_measured_set
 from crosscheck.label.factors import CRITERIA, FACTORS, HIGHEST, Factor
 from crosscheck.label.ladder import RULES, looked
-from crosscheck.library.find import load_case
+from crosscheck.library.find import load_case, shipped_cases
 from crosscheck.records.session import last_session
 from crosscheck.report import write_all
 from crosscheck.report.measured import write_measured
@@ -204,6 +204,13 @@ def test_a_level_cannot_be_claimed(again: Path) -> None:
     refused = CliRunner().invoke(cli.app, ["label", str(again / NAME)])
     assert refused.exit_code == 2
     assert "verification" in refused.output
+
+
+def test_every_case_of_the_library_states_its_use_and_its_limits() -> None:
+    """In words of its own: no two cases have the same use."""
+    cases = shipped_cases()
+    assert all(case.run.limits and not case.run.intended_use.endswith(".") for case in cases)
+    assert len({case.run.intended_use for case in cases} - {""}) == len(cases)
 
 
 def resealed(folder: Path, change: Callable[[str, Any], Any]) -> None:
