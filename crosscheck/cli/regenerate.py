@@ -49,7 +49,7 @@ def regenerate(
         runs_on = scheduler_at(scheduler)
         for case in chosen:
             try:
-                with LiveProgress(common.console) as live:
+                with LiveProgress(common.console, first="evaluating the routes that files of the case give") as live:
                     limits = Limits(jobs, time_limit)
                     done = make_again(case, check=check, limits=limits, scheduler=runs_on, listener=live.hear)
             except CaseError as error:

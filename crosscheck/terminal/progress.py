@@ -53,10 +53,13 @@ class LiveProgress:
     """A context in which `hear` shows the events of a session; without a terminal only lasting lines are printed.
 
     Only VERBOSE has lasting lines, one for every job; otherwise failures are shown at the end. QUIET shows no bar.
-    Where output is redirected, a line every half a minute says that the session goes on, unless it is QUIET.
+    Where output is redirected, a line every half a minute says that the session goes on, unless it is QUIET. `first`:
+    what is done before the first run.
     """
 
-    def __init__(self, console: Console, verbosity: Verbosity = Verbosity.VERBOSE) -> None:
+    def __init__(
+        self, console: Console, verbosity: Verbosity = Verbosity.VERBOSE, first: str = "planning the runs"
+    ) -> None:
         self._lasting = verbosity is Verbosity.VERBOSE
         self.bars = bars(console, TimeLeft(), quiet=verbosity is Verbosity.QUIET)
         self._overall: TaskID | None = None
@@ -67,7 +70,8 @@ class LiveProgress:
         self._records: dict[int, list[RunRecord]] = {}
         self._started: dict[int, float] = {}
         beats = verbosity is not Verbosity.QUIET and not console.is_terminal
-        self._heartbeat = Heartbeat(console) if beats else None
+        self._heartbeat = Heartbeat(console, first=first) if beats else None
+        self._first: TaskID | None = self.bars.add_task(first, total=None, running=True)
 
     def __enter__(self) -> LiveProgress:
         self.bars.start()
@@ -84,6 +88,9 @@ class LiveProgress:
         """Show one event."""
         if self._heartbeat is not None:
             self._heartbeat.hear(jobs, event)
+        if self._first is not None:
+            self.bars.remove_task(self._first)
+            self._first = None
         if self._overall is None:
             self._overall = self.bars.add_task("all runs", total=len(jobs))
             self._begin = time.monotonic()
@@ -199,8 +206,11 @@ class Heartbeat:
     A thread prints, since a long run sends no events.
     """
 
-    def __init__(self, console: Console, every_s: float = EVERY_S, clock: Callable[[], float] = time.monotonic) -> None:
-        self._console = console
+    def __init__(
+        self, console: Console, every_s: float = EVERY_S, clock: Callable[[], float] = time.monotonic,
+        first: str = "planning the runs",
+    ) -> None:  # fmt: skip
+        self._console, self._first = console, first
         self._every_s = every_s
         self._clock = clock
         self._begin = clock()
@@ -253,7 +263,7 @@ class Heartbeat:
             running = list(self._running.values())
             more = f", and {len(running) - NAMED} more" if len(running) > NAMED else ""
             what = f"running {', '.join(running[:NAMED])}{more}" if running else "no run has begun"
-            done = f"{self._done} of {self._count} runs done" if self._count else "planning the runs"
+            done = f"{self._done} of {self._count} runs done" if self._count else self._first
             return f"{done} after {in_words(passed)}{left}; {what}"
 
     def _beat(self) -> None:

@@ -114,7 +114,7 @@ def test_a_line_says_what_runs_how_much_is_done_and_how_long_yet() -> None:
 
 
 def shown(monkeypatch: pytest.MonkeyPatch, verbosity: Verbosity, terminal: bool) -> str:
-    monkeypatch.setattr(progress.Heartbeat.__init__, "__defaults__", (0.01, time.monotonic))
+    monkeypatch.setattr(progress.Heartbeat.__init__, "__defaults__", (0.01, time.monotonic, "planning the runs"))
     screen = io.StringIO()
     with LiveProgress(Console(file=screen, width=200, force_terminal=terminal), verbosity) as live:
         live.hear(jobs(2), Event(0, "started"))
@@ -131,6 +131,19 @@ def test_redirected_output_has_it_and_nothing_else_has(monkeypatch: pytest.Monke
     assert "0 of 2 runs done after" in shown(monkeypatch, Verbosity.NORMAL, terminal=False)
     assert "runs done" not in shown(monkeypatch, Verbosity.NORMAL, terminal=True)
     assert "runs done" not in shown(monkeypatch, Verbosity.QUIET, terminal=False)
+
+
+def test_what_comes_before_the_first_run_is_named() -> None:
+    """Equations of a case's own may take minutes: on a terminal and beside it they are not called planning."""
+    beat = Heartbeat(Console(file=io.StringIO()), first="evaluating closed forms")
+    assert beat.line() == "evaluating closed forms after 1 s; no run has begun"
+    screen = io.StringIO()
+    with LiveProgress(Console(file=screen, width=200, force_terminal=True), first="evaluating closed forms") as live:
+        time.sleep(0.3)
+        before = screen.getvalue()
+        live.hear(jobs(2), Event(0, "started"))
+        assert live.bars.tasks[0].description == "all runs"
+    assert "evaluating closed forms" in before
 
 
 def test_it_ends_with_its_session() -> None:
