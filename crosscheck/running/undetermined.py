@@ -20,7 +20,7 @@ from flexmb.dense import DenseSystem
 from flexmb.dense.closures import open_loads
 from flexmb.run.simulate import simulate
 from flexmb.run.trajectory import Trajectory
-from flexmb.scene.events import Change, EndRun, Impact, Latch, Release
+from flexmb.scene.events import Change, Dock, EndRun, Impact, Latch, Release, Separate
 from flexmb.scene.schema import Scene
 from flexmb.scene.stops import leaving
 from flexmb.scene.tree import coordinates
@@ -39,7 +39,7 @@ Held = NDArray[np.bool_]
 def undetermined(scene: Scene, t_end: float | None = None) -> Openness:
     """The components of loads and drive loads that are open at the start, or at any time until `t_end` (s).
 
-    Where all loads are determined at the start and no event holds or releases a coordinate, they are determined
+    Where all loads are determined at the start and no event holds or releases anything, they are determined
     everywhere but at single instants: rows that are independent somewhere are so nearly everywhere.
     """
     if not scene.constraints:
@@ -84,20 +84,32 @@ def _open_in_run(scene: Scene, t_end: float) -> Openness:
         run = simulate(allowed, t_end, samples=PLACES, rtol=1e-8, atol=1e-10, max_steps=STEPS)
     except (ClosureError, NotImplementedError):
         return Openness()
-    dense, unknown = DenseSystem(scene), Openness()
-    for state, held in _states(dense, run):
+    unknown = Openness()
+    for dense, state, held in _states(DenseSystem(scene), run):
         unknown |= _at(dense, state, held)
     return unknown
 
 
-def _states(dense: DenseSystem, run: Trajectory) -> Iterator[tuple[State, Held]]:
-    """States of a run, with the speeds that are held there."""
+def _states(dense: DenseSystem, run: Trajectory) -> Iterator[tuple[DenseSystem, State, Held]]:
+    """States of a run, with the closures that are closed and the speeds that are held there."""
     held, rest = _prescribed(dense), list(run.events)
     for sample in range(len(run.t)):
         while rest and rest[0].t <= run.t[sample]:
             held = _held_after(dense, held, rest[0].name, rest[0].after)
-            yield rest.pop(0).after, held
-        yield run.state_at(sample), held
+            dense = _joined_after(dense, rest[0].name)
+            yield dense, rest.pop(0).after, held
+        yield dense, run.state_at(sample), held
+
+
+def _joined_after(dense: DenseSystem, name: str) -> DenseSystem:
+    """The system with the closures open and closed as an event of this name leaves them."""
+    scene = dense.scene
+    actions = [action for event in scene.events if event.name == name for action in event.actions]
+    now = {action.closure: isinstance(action, Dock) for action in actions if isinstance(action, Separate | Dock)}
+    if not now:
+        return dense
+    closures = tuple(structs.replace(each, closed=now.get(each.name, each.closed)) for each in scene.closures)
+    return DenseSystem(structs.replace(scene, closures=closures))
 
 
 def _held_after(dense: DenseSystem, held: Held, name: str, after: State) -> Held:
@@ -114,7 +126,7 @@ def _held_after(dense: DenseSystem, held: Held, name: str, after: State) -> Held
                     if action.rests:
                         stands = after.u[place[action.coordinate]] == 0.0
                         held[place[action.coordinate]] = stands and name == event.name
-                case Change() | EndRun():
+                case Change() | Separate() | Dock() | EndRun():
                     pass
                 case _:
                     assert_never(action)
@@ -122,10 +134,11 @@ def _held_after(dense: DenseSystem, held: Held, name: str, after: State) -> Held
 
 
 def _holds(scene: Scene) -> bool:
-    """Whether any event changes which coordinates are held."""
-    actions = [action for event in scene.events for action in event.actions]
+    """Whether any event changes which coordinates are held or which closures are closed."""
     return any(
-        isinstance(action, Latch | Release) or (isinstance(action, Impact) and action.rests) for action in actions
+        isinstance(action, Latch | Release | Separate | Dock) or (isinstance(action, Impact) and action.rests)
+        for event in scene.events
+        for action in event.actions
     )
 
 

@@ -40,6 +40,12 @@ def consistent(closures: Closures, t: float, y: Real, asked: AskedFor = NOTHING_
     If these cannot be kept, the nearest closed state. ClosureError if there is none, or if values that the scene marks
     as given cannot be kept.
     """
+    y = closed_positions(closures, t, y, asked)
+    return _as_asked(closures, t, y, asked.speeds, asked, _moving, _rate)
+
+
+def closed_positions(closures: Closures, t: float, y: Real, asked: AskedFor = NOTHING_ASKED) -> Real:
+    """The same of the coordinates alone, with the speeds as they are; the independent rows are counted there."""
     start = y.copy()
     closures.linearise(t, start)
     y = _as_asked(closures, t, start, asked.coordinates, asked, _closed, _gap)
@@ -47,7 +53,7 @@ def consistent(closures: Closures, t: float, y: Real, asked: AskedFor = NOTHING_
         closures.linearise(t, y)
     closures.count_rows()
     _refuse_half_a_turn(closures)
-    return _as_asked(closures, t, y, asked.speeds, asked, _moving, _rate)
+    return y
 
 
 class Opening(NamedTuple):

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from flexmb.closure import dynamics
 from flexmb.closure.branch import GAPS, UNRECORDED
-from flexmb.closure.constants import SUPPRESSED
+from flexmb.closure.constants import suppressed
 from flexmb.closure.factor import DEPENDENT
 from flexmb.closure.null_loads import GroupResponse, blocks, null_loads
 from flexmb.closure.tables import ROTATION, Closed, ClosureConstants, ClosureWorkspace, Recursion, workspace
@@ -355,6 +355,12 @@ class Closures:
         dynamics.move(*self._layout.whole(t, y), np.zeros(0), dynamics.UNCHANGED, self._chain)
         return {closure.name: self._gap(i, "value") for i, closure in enumerate(self.scene)}
 
+    def relative_pose(self, t: float, y: Real, name: str) -> tuple[Real, Real]:
+        """R_AB (3,3) and the position (3,) m of B from A of a closure, in axes of A in which its axis is z."""
+        dynamics.move(*self._layout.whole(t, y), np.zeros(0), dynamics.UNCHANGED, self._chain)
+        own = self._own.closure[[closure.name for closure in self.scene].index(name)]
+        return own["rotation"].reshape(3, 3).copy(), own["position"].copy()
+
     def passing_time(self, t: float, y: Real) -> float:
         """The least time (s) in which a closure moves by its own size; inf at rest."""
         dynamics.move(*self._layout.whole(t, y), np.zeros(0), dynamics.UNCHANGED, self._chain)
@@ -375,13 +381,19 @@ class Closures:
     def begin_at(self, t: float, y: Real, before: Closures | None = None) -> None:
         """Count the independent rows at y = [q, u, work], which fulfils all closures (the scene's values may not).
 
-        `before`: the same closures in the previous scene; its count is reused if the same speeds are prescribed.
+        `before`: the same closures in the previous scene; its count is reused if the same speeds are prescribed and the
+        same closures are closed.
         """
-        if before is not None and np.array_equal(self._is_prescribed, before._is_prescribed):
+        if before is not None and self._is_counted_as(before):
             self._counted[0] = before._counted[0]
         else:
             self.linearise(t, y)
             self.count_rows()
+
+    def _is_counted_as(self, other: Closures) -> bool:
+        """Whether the same rows are independent as in other closures of the same bodies."""
+        same_rows = np.array_equal(self.constants[1].row, other.constants[1].row)
+        return same_rows and np.array_equal(self._is_prescribed, other._is_prescribed)
 
     @property
     def _is_prescribed(self) -> Flags:
@@ -428,7 +440,7 @@ class Closures:
         pairs = [
             (i, 4 * axis)
             for i, closure in enumerate(self.scene) if not isinstance(closure, Coupling)
-            for axis in about.get(SUPPRESSED[closure.type][0], ())
+            for axis in about.get(suppressed(closure)[0], ())
         ]  # fmt: skip
         which, places = np.array(pairs, np.int64).reshape(-1, 2).T
         return which, places

@@ -9,7 +9,7 @@ import numpy as np
 
 from flexmb.building.links import BodyLink, sides_of_closures
 from flexmb.closure import tables as t
-from flexmb.closure.groups import clusters, group_tables, path, path_of_coupling
+from flexmb.closure.groups import UNLOADED, clusters, group_tables, path, path_of_coupling
 from flexmb.scene import schema as s
 from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.tree import coupled
@@ -29,6 +29,14 @@ SUPPRESSED = {
 }
 
 
+OPEN = ("", "")
+
+
+def suppressed(closure: s.Closure) -> tuple[str, str]:
+    """The rotations and translations that a closure suppresses as it is; none while it is open."""
+    return SUPPRESSED[closure.type] if closure.closed else OPEN
+
+
 def closure_constants(
     scene: s.Scene,
     constants: Constants,
@@ -37,6 +45,9 @@ def closure_constants(
     like: s.Scene | None = None,
 ) -> t.ClosureConstants:
     """Constants of a scene's closures and couplings. `like`: see `flexmb.building.links.links`.
+
+    An open closure keeps its place among them, so that its load is an output in all parts of a run. It has no rows, and
+    no body carries its load: it is a group of its own, which costs nothing.
 
     ports: (body, port) of both sides of each closure, (-1, -1) on the ground.
     """
@@ -50,7 +61,10 @@ def closure_constants(
                 sides[i, j]["position"] = side.offset
                 sides[i, j]["rotation"] = (rotation_matrix(side.quaternion) @ side.turn).ravel()
     parent = constants.body["parent"].tolist()
-    paths = [path(constants, parent, bodies) for bodies in sides["body"][: len(scene.closures)].tolist()]
+    paths = [
+        path(constants, parent, bodies) if closure.closed else UNLOADED
+        for closure, bodies in zip(scene.closures, sides["body"][: len(scene.closures)].tolist(), strict=True)
+    ]
     terms = _terms(scene, constants, chain, closures)
     for i in range(len(scene.closures), len(closures)):
         bodies = terms["body"][closures["term_start"][i] : closures["term_stop"][i]].tolist()
@@ -103,7 +117,7 @@ def _rows(scene: s.Scene, i: int, closure: s.Closure | s.Coupling) -> list[tuple
     if isinstance(closure, s.Coupling):
         led = coupled(scene, closure)[0].named.coordinate
         return [(i, t.ROTATION if led.ANGULAR else t.TRANSLATION, 0)]
-    rotations, translations = SUPPRESSED[closure.type]
+    rotations, translations = suppressed(closure)
     turning = [(i, t.ROTATION, "xyz".index(axis)) for axis in rotations]
     return turning + [(i, t.TRANSLATION, "xyz".index(axis)) for axis in translations]
 

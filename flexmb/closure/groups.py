@@ -37,6 +37,10 @@ class LoadPath(NamedTuple):
         return sorted(self.own | self.carriers, reverse=True)
 
 
+UNLOADED = LoadPath(frozenset(), frozenset())
+"""The path of a closure without loads: it is open."""
+
+
 def path(c: Constants, parent: Sequence[int], bodies: Sequence[int]) -> LoadPath:
     """The load path of a closure between two bodies, -1 for the ground."""
     one, other = (_ancestors(parent, k) for k in bodies)

@@ -50,7 +50,10 @@ def _sides(dense: DenseSystem, closure: s.Closure) -> tuple[tuple[int, Seat], tu
 
 
 def suppressed(closure: s.Closure) -> tuple[list[tuple[Real, Real]], list[Real]]:
-    """Pairs of axes (of A, of B) that a closure keeps at right angles, and directions along which B stays at A."""
+    """Pairs of axes (of A, of B) that a closure keeps at right angles, and directions along which B stays at A; none
+    while it is open."""
+    if not closure.closed:
+        return [], []
     z = np.array(closure.axis)
     x = np.cross(z, np.eye(3)[np.argmin(np.abs(z))])
     x /= np.linalg.norm(x)
@@ -90,7 +93,8 @@ def rows(dense: DenseSystem, closure: s.Closure | s.Coupling, motion: Motions) -
         [part[:, 0] @ axis for part in (B.position.value, B.position.rate, B.position.acceleration)] for axis in steps
     ]
     count = len(motion.u)
-    return np.array([[np.broadcast_to(v, count) for v in row] for row in rows]).transpose(1, 2, 0)
+    values = np.array([[np.broadcast_to(v, count) for v in row] for row in rows])
+    return values.reshape(len(rows), 3, count).transpose(1, 2, 0)
 
 
 def wrenches(dense: DenseSystem, q: Real) -> dict[str, Real]:

@@ -17,7 +17,7 @@ from flexmb.integrate.watch import UNKNOWN, Watch, watch
 from flexmb.run.event_record import EventMemory, EventRecord
 from flexmb.run.propagate import Integration, Raw
 from flexmb.run.situation import Situation
-from flexmb.scene.events import Impact
+from flexmb.scene.events import Dock, Impact
 from flexmb.scene.schema import SceneEvent
 from flexmb.scene.tree import watchable
 from flexmb.tables.status import Status
@@ -279,7 +279,8 @@ class Sides:
         if abs(height) > self.near(event):
             return int(np.sign(height)), 0  # a signal that jumped, also by its own event
         if rate == 0.0:
-            return UNKNOWN if self.is_signal(event) else 0, came
+            docks = any(isinstance(action, Dock) for action in event.actions)  # a closure may hold it at its level
+            return UNKNOWN if self.is_signal(event) else 0, 0 if docks else came
         return (-came if came * rate < 0.0 else came), 0
 
     def _heights(self, raw: Raw, y: Real, events: Sequence[SceneEvent]) -> dict[str, float]:

@@ -29,7 +29,8 @@ class EventRecord:
     held. energy_change (J) is included in the work of the trajectory. before, after: the states. closures: by closure,
     its impulse (6,) [N m s; N s] on body_b about frame B, World axes. Impulses that redundant closures leave
     undetermined are NaN. early (s): how long before its instant the event happened; it is not zero only if the instant
-    lies near a singular position of a closed chain.
+    lies near a singular position of a closed chain. misfits: by closure that was closed, how far its frames were apart
+    before, (m, rad) along and about what it suppresses.
     """
 
     name: str
@@ -40,6 +41,7 @@ class EventRecord:
     after: State
     closures: dict[str, Real] = field(default_factory=dict)
     early: float = 0.0
+    misfits: dict[str, tuple[float, float]] = field(default_factory=dict)
 
     __repr__ = brief
 

@@ -18,7 +18,7 @@ import numpy as np
 from flexmb.closure.factor import DEPENDENT
 from flexmb.system.system import System
 from flexmb.tables.state import DynamicsError, State, pack
-from flexmb.typing import Real
+from flexmb.typing import Index, Real
 
 if TYPE_CHECKING:
     from flexmb.closure.operators import RowMotion
@@ -40,8 +40,9 @@ class Struck(NamedTuple):
     closures: dict[str, Real]
 
 
-def struck(system: System, state: State, speeds: Mapping[int, float]) -> Struck:
-    """The speeds after impulses that give some speeds new values: `speeds` by index in u.
+def struck(system: System, state: State, speeds: Mapping[int, float], closing: str | None = None) -> Struck:
+    """The speeds after impulses that give some speeds new values: `speeds` by index in u. `closing`: a closure that
+    closes at this instant, whose impulse takes the motion away that it suppresses, and does work on it.
 
     Impulses of drives keep prescribed speeds unchanged, and impulses of closures keep closures closed. All impulses act
     through hinges: the total momentum changes only by those of hinges on the ground. The energy is the impulses' work,
@@ -60,14 +61,16 @@ def struck(system: System, state: State, speeds: Mapping[int, float]) -> Struck:
     moved, _, rank, _ = np.linalg.lstsq((half / size).T, change / size, rcond=DEPENDENT)
     left = np.abs(half.T @ moved - change) / size
     moving = float(np.sqrt(state.u @ factors.multiply(state.u)))
-    _refuse_unreached(left, _unavoidable(moved, moving, change[len(places) :] / size[len(places) :]), state)
+    takes = np.zeros(0, np.int64) if closing is None else len(places) + _rows_of(system, closing)
+    opening = np.delete(change / size, takes)[len(places) :]  # but the rates that the impulse is to take away
+    _refuse_unreached(left, _unavoidable(moved, moving, opening), state)
     impulses = np.linalg.lstsq(half / size, moved, rcond=DEPENDENT)[0] / size
     u = state.u + factors.solve(along.T @ impulses)
     u[places] = state.u[places] + change[: len(places)]
     if rank == system.nu and not np.any(u[places]):
         u[:] = 0.0  # no freedom is left: rounding errors in u would violate the closures
     held = impulses[: len(places)]
-    energy = 0.5 * float(held @ (u[places] + state.u[places]))
+    energy = 0.5 * float(held @ (u[places] + state.u[places])) - 0.5 * float(impulses[takes] @ change[takes])
     if rows is None:
         return Struck(u, dict(zip(places, held.tolist(), strict=True)), energy, {})
     others = np.linalg.svd(half / size)[2][rank:] / size  # impulses that change no speed
@@ -90,6 +93,13 @@ def _rows(system: System, state: State) -> RowMotion:
 
     assert system.closures is not None  # it has rows
     return RowMotion(system.closures, state.t, pack(state))
+
+
+def _rows_of(system: System, name: str) -> Index:
+    """The numbers of the rows of a closure."""
+    assert system.closures is not None  # the closure is one of them
+    number = [closure.name for closure in system.scene.closures].index(name)
+    return np.flatnonzero(system.closures.constants[1].row["closure"] == number)
 
 
 def _sizes(half: Real, coordinates: int) -> Real:

@@ -12,6 +12,7 @@ from flexmb.integrate.memory import Memory
 from flexmb.run.event_record import EventMemory
 from flexmb.run.restart import Restart, fitting
 from flexmb.scene.problems import closest
+from flexmb.scene.tree import closes
 from flexmb.system.system import System
 from flexmb.tables import arguments
 from flexmb.tables.state import State, pack
@@ -84,10 +85,14 @@ def _taken_up(system: System, restart: Restart, method: str) -> Beginning:
 
 def _count_rows(system: System, t: float, motion: Real) -> None:
     """Have the independent rows of closures counted. If no closed state is found from the scene's own initial state, as
-    after events that hold hinges, the state of the resumed run is used."""
+    after events that hold hinges, the state of the resumed run is used; likewise if events close closures, because in
+    the initial state their frames may be anywhere."""
     from flexmb.closure.closures import ClosureError  # imported here because trees do not need it
 
     assert system.closures is not None  # of a closed chain
+    if closes(system.scene):
+        system.closures.begin_at(t, motion)
+        return
     try:
         system.initial_state  # noqa: B018 - counts the rows
     except ClosureError:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager
-from typing import NamedTuple, assert_never
+from math import asin, pi
+from typing import TYPE_CHECKING, NamedTuple, assert_never
 
 import numpy as np
 from msgspec.structs import replace
@@ -11,14 +12,14 @@ from msgspec.structs import replace
 from flexmb.integrate.settings import Settings
 from flexmb.kept import kept
 from flexmb.run.event_record import EventRecord
-from flexmb.run.impulses import struck
+from flexmb.run.impulses import Struck, struck
 from flexmb.run.origin import Beginning
 from flexmb.run.outputs import doubt_about, observed
 from flexmb.run.propagate import Integration, Raw, integration
 from flexmb.run.trajectory import Trajectory
-from flexmb.scene.events import Action, Change, EndRun, Impact, Latch, Release
+from flexmb.scene.events import Action, Change, Dock, EndRun, Impact, Latch, Release, Separate
 from flexmb.scene.functions import Constant
-from flexmb.scene.schema import Scene, SceneEvent, Wheel
+from flexmb.scene.schema import Closure, Scene, SceneEvent, Wheel
 from flexmb.scene.stops import leaves, leaving, resting, stop_sensor
 from flexmb.scene.tree import Coordinate, rate_name, scalar_paths
 from flexmb.scene.values import changed_at, values_at
@@ -27,9 +28,15 @@ from flexmb.system.compile import assembled
 from flexmb.system.scene_arrays import kernels_of
 from flexmb.system.system import System
 from flexmb.tables.features import asking
-from flexmb.tables.state import State
+from flexmb.tables.state import DynamicsError, State
 from flexmb.tables.status import Status
 from flexmb.typing import Real
+
+if TYPE_CHECKING:
+    from flexmb.closure.closures import Closures
+
+
+PASSES = 5  # in which frame B of a closure that closes as it is found comes to its place
 
 
 class EventInstant(NamedTuple):
@@ -42,6 +49,7 @@ class EventInstant(NamedTuple):
     work: float
     impulses: dict[str, float]
     closures: dict[str, Real]
+    misfits: dict[str, tuple[float, float]]
 
 
 class Situation:
@@ -182,17 +190,82 @@ class Situation:
                 self._become(self.system.scene.with_values({path: value}), at)
                 self.given = self.given.with_values({path: value})
                 at.y[-1] += self._energy(at) - energy
+            case Separate(closure=name):
+                self._become(_with_closure(self.system.scene, self._given_closure(name, closed=False)), at)
+            case Dock():
+                self._dock(action, at)
             case EndRun():
                 pass
             case _:
                 assert_never(action)
 
+    def _given_closure(self, name: str, *, closed: bool) -> Closure:
+        """A closure as the scene gives it, open or closed."""
+        [closure] = [each for each in self.given.closures if each.name == name]
+        return replace(closure, closed=closed)
+
+    def _dock(self, dock: Dock, at: EventInstant) -> None:
+        """Close a closure: first the positions, then, by an impulse, the speeds. Nothing happens if it is closed."""
+        from flexmb.closure.assembly import closed_positions  # imported here because trees do not need it
+
+        name = dock.closure
+        if any(closure.name == name and closure.closed for closure in self.system.scene.closures):
+            return
+        self._become(_with_closure(self.system.scene, self._given_closure(name, closed=True)), at)
+        at.misfits[name] = self._misfit(dock, self._closures, at)
+        if dock.as_found:
+            self._take_as_found(name, at)
+        energy = self._energy(at)
+        at.y[:] = closed_positions(self._closures, at.t, at.y)
+        at.y[-1] += self._energy(at) - energy
+        self._take(at, struck(self.system, self._state(at.t, at.y), {}, name))
+        self.system.project(at.t, at.y, self.system.constants)
+
+    @property
+    def _closures(self) -> Closures:
+        closures = self.system.closures
+        assert closures is not None  # the one that closes is among them
+        return closures
+
+    def _take_as_found(self, name: str, at: EventInstant) -> None:
+        """Move frame B of a closure to where it is closed. A node that deforms moves it a little further each time."""
+        from flexmb.closure.as_found import as_found  # imported here because trees do not need it
+        from flexmb.closure.projection import CLOSED
+
+        for _ in range(PASSES):
+            [closure] = [each for each in self.system.scene.closures if each.name == name]
+            pose = self._closures.relative_pose(at.t, at.y, name)
+            self._become(_with_closure(self.system.scene, as_found(closure, *pose)), at)
+            self._closures.linearise(at.t, at.y)
+            if np.abs(self._closures.errors()).max() <= CLOSED:
+                break
+
+    def _misfit(self, dock: Dock, closures: Closures, at: EventInstant) -> tuple[float, float]:
+        """How far the frames of a closure are apart (m, rad) before it closes; DynamicsError beyond its tolerance."""
+        gap, sine = closures.gaps(at.t, at.y)[dock.closure]
+        number = [closure.name for closure in self.system.scene.closures].index(dock.closure)
+        angle = pi / 2.0 if dock.closure in closures.half_turned() else asin(min(sine, 1.0))
+        atol, rtol = self.settings.atol, self.settings.rtol
+        size = float(closures.sizes[number])
+        if not (gap <= dock.tolerance_m + atol + rtol * size and angle <= dock.tolerance_rad + atol + rtol):
+            at_least = "at least " if angle == pi / 2.0 else ""
+            raise DynamicsError(
+                f'at t = {at.t:g} s an event closes closure "{dock.closure}", whose frames are {gap:.3g} m and '
+                f"{at_least}{angle:.3g} rad apart: bring them together first, or give tolerance_m and tolerance_rad "
+                "that admit this, and bodies are moved by so much"
+            )
+        return gap, angle
+
     def _strike(self, at: EventInstant, name: str, factor: float) -> None:
         """Apply an impulse that multiplies the speed of a coordinate by `factor`."""
+        place = self._rate_place(name)
+        speeds = {place - self.system.nq: factor * at.y[place]}
+        self._take(at, struck(self.system, self._state(at.t, at.y), speeds))
+
+    def _take(self, at: EventInstant, state: Struck) -> None:
+        """Take over the speeds after impulses, and add these to those of the instant."""
         y, nq = at.y, self.system.nq
         rates = {self._rate_place(path): path for path in self._paths}
-        place = self._rate_place(name)
-        state = struck(self.system, self._state(at.t, at.y), {place - nq: factor * y[place]})
         y[nq:-1] = state.u
         y[-1] += state.energy
         for j, impulse in state.impulses.items():
@@ -238,7 +311,7 @@ class Situation:
             self.system.closures.begin_at(at.t, at.y, before.closures)
 
     def _instant(self, t: float, y: Real) -> EventInstant:
-        return EventInstant(t, y, self._state(t, y), float(y[-1]), {}, {})
+        return EventInstant(t, y, self._state(t, y), float(y[-1]), {}, {}, {})
 
     def _state(self, t: float, y: Real) -> State:
         return self.system.state(y[: self.system.nq].copy(), y[self.system.nq : -1].copy(), t)
@@ -248,7 +321,13 @@ class Situation:
 
 
 def _recorded(name: str, at: EventInstant, after: State) -> EventRecord:
-    return EventRecord(name, at.t, at.impulses, float(at.y[-1]) - at.work, at.before, after, at.closures)
+    gained = float(at.y[-1]) - at.work
+    return EventRecord(name, at.t, at.impulses, gained, at.before, after, at.closures, misfits=at.misfits)
+
+
+def _with_closure(scene: Scene, changed: Closure) -> Scene:
+    """The scene with a closure in place of that of its name."""
+    return replace(scene, closures=tuple(changed if each.name == changed.name else each for each in scene.closures))
 
 
 def with_stops(system: System) -> System:

@@ -120,7 +120,8 @@ class SceneBuilder(SchemaMethods):
         self, name: str, watch: str, level: float, *actions: s.Action,
         crossing: Literal["rising", "falling", "either"] = "either",
     ) -> Self:  # fmt: skip
-        """Actions when `watch` reaches `level`: `Latch`, `Release`, `Impact`, `Change`, `EndRun`, in the given order.
+        """Actions when `watch` reaches `level`: `Latch`, `Release`, `Impact`, `Change`, `Separate`, `Dock`,
+        `EndRun`, in the given order.
 
         `watch`: "time", a scalar coordinate such as "pivot.rotation" or "wheel.angle", a rate, "pivot.rotation.rate" or
         "wheel.speed", or one number of a sensor or controller, "height[2]".

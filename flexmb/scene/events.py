@@ -8,6 +8,7 @@ from flexmb.scene.bodies import SceneStruct
 from flexmb.scene.functions import Function
 from flexmb.scene.quantities import PURE, Number, unit, within
 
+Misfit = Annotated[float, within(0.0)]
 Restitution = Annotated[float, within(0.0, 1.0, remedy="from 0 (no rebound) to 1 (no loss)"), PURE]
 
 
@@ -49,11 +50,32 @@ class Change(SceneStruct, frozen=True, kw_only=True, tag="change", tag_field="ki
     value: Annotated[Number, unit("of the path")] | Function
 
 
+class Separate(SceneStruct, frozen=True, kw_only=True, tag="separate", tag_field="kind"):
+    """A closure opens: a clamp lets go, a stage separates. Its load is zero from then on; nothing jumps."""
+
+    closure: str
+
+
+class Dock(SceneStruct, frozen=True, kw_only=True, tag="dock", tag_field="kind"):
+    """A closure closes: an impulse takes away the motion that it suppresses from then on; its load is an output.
+
+    Its frames may be apart by `tolerance_m` along the suppressed translations and by `tolerance_rad` about the
+    suppressed rotations, beside the error that the run allows: bodies are moved until it is closed, as at the start of
+    a run, and the record of the event says by how much. With `as_found` no body is moved: a gripper holds what it grips
+    as it finds it, and frame B moves on its body. A larger misfit ends the run with an error.
+    """
+
+    closure: str
+    tolerance_m: Misfit = 0.0
+    tolerance_rad: Misfit = 0.0
+    as_found: bool = False
+
+
 class EndRun(SceneStruct, frozen=True, kw_only=True, tag="end", tag_field="kind"):
     """The run ends, with status OK."""
 
 
-Action = Latch | Release | Impact | Change | EndRun
+Action = Latch | Release | Impact | Change | Separate | Dock | EndRun
 
 
 class SceneEvent(SceneStruct, frozen=True, kw_only=True):

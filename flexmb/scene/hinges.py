@@ -206,6 +206,9 @@ class Closure(SceneStruct, frozen=True, kw_only=True):
     in a groove), `in_plane` in the plane across it. Initial coordinates need to fit only roughly: a near state that
     closes all loops is found, that keeps what is given (see AngularCoordinate). Its load is an output: on `body_b`,
     about B. A gimbal of two axes is a universal closure between turned frames, one of three a spherical one.
+
+    With `closed = false` it is open at the start: it suppresses nothing and its load is zero, until an event closes it
+    (`Dock`). Events open closures by `Separate`.
     """
 
     name: str
@@ -219,3 +222,4 @@ class Closure(SceneStruct, frozen=True, kw_only=True):
     position_b_m: Vector = ZERO
     quaternion_b: Quaternion = IDENTITY
     axis: Axis = Z_AXIS
+    closed: bool = True

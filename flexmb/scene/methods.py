@@ -240,7 +240,7 @@ class SchemaMethods(Collector):
     def closure(
         self, name: str, type: str, body_a: str, body_b: str, *, node_a: str = "origin", node_b: str = "origin",
         position_a: ArrayLike = ZERO, quaternion_a: ArrayLike = IDENTITY, position_b: ArrayLike = ZERO,
-        quaternion_b: ArrayLike = IDENTITY, axis: ArrayLike = Z_AXIS,
+        quaternion_b: ArrayLike = IDENTITY, axis: ArrayLike = Z_AXIS, closed: bool = True,
     ) -> Self:  # fmt: skip
         """A loop closure on top of the tree: a hinge between any two nodes, whose motions are not coordinates.
 

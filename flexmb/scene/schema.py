@@ -55,7 +55,7 @@ from flexmb.scene.control import (
 )
 from flexmb.scene.couplings import *  # noqa: F403
 from flexmb.scene.couplings import Coupling
-from flexmb.scene.events import Action, Change, EndRun, Impact, Latch, Release, SceneEvent
+from flexmb.scene.events import Action, Change, Dock, EndRun, Impact, Latch, Release, SceneEvent, Separate
 from flexmb.scene.freedoms import AngularCoordinate, Freedom, LinearCoordinate, MotionKeys, ScalarFreedom
 from flexmb.scene.functions import Constant, ControlSignal, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.scene.hinges import *  # noqa: F403
@@ -239,10 +239,10 @@ msgspec.msgpack.Decoder(Scene)
 
 __all__ = [
     "Action", "BeamBody", "BeamNode", "BeamStation", "Body", "Change", "Constant", "ControlSignal", "Controller",
-    "CoordinateSensor", "DistanceSensor", "DriveSensor", "EndRun", "Function", "GainTable", "Impact",
+    "CoordinateSensor", "DistanceSensor", "Dock", "DriveSensor", "EndRun", "Function", "GainTable", "Impact",
     "InertiaPoint", "Latch", "Level", "Load", "LoadSensor", "Marker", "MarkerSensor", "Matrix3", "ModalBody",
     "ModalNode", "ModalState", "Modes", "Node", "Pid", "PointMass", "ProfileSensor", "Pulse", "Quaternion", "Ramp",
-    "Release", "RigidBody", "Saturation", "Scene", "SceneEvent", "Sensor", "SidBody", "Sine", "SmoothStep",
+    "Release", "RigidBody", "Saturation", "Scene", "SceneEvent", "Sensor", "Separate", "SidBody", "Sine", "SmoothStep",
     "SpinUp", "StateSpace", "StrainPolynomials", "Table", "TimeSensor", "TipMass", "TotalLoad", "UserLaw", "Vector",
     "Waiver", "Wheel",
 ]  # fmt: skip

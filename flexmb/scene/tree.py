@@ -14,7 +14,7 @@ from flexmb.scene import control as c
 from flexmb.scene.bodies import IDENTITY, ZERO, BeamBody, Body, ModalBody, Quaternion, RigidBody, SidBody, Vector
 from flexmb.scene.connectors import AlongHinge, AngularFriction, BetweenNodes
 from flexmb.scene.couplings import CoupledCoordinate, Coupling
-from flexmb.scene.events import Impact
+from flexmb.scene.events import Dock, Impact, Separate
 from flexmb.scene.freedoms import AngularCoordinate, Coordinate, LinearCoordinate
 from flexmb.scene.hinges import Closure, Hinge
 from flexmb.scene.keys import struct_keys
@@ -253,6 +253,16 @@ def watches_signals(scene: Scene) -> bool:
         return False
     rests = any(isinstance(action, Impact) and action.rests for event in scene.events for action in event.actions)
     return rests or not {event.watch for event in scene.events} <= set(watchable(scene))
+
+
+def opens(scene: Scene) -> bool:
+    """Whether any event opens a closure: what it suppresses may be free later."""
+    return any(isinstance(action, Separate) for event in scene.events for action in event.actions)
+
+
+def closes(scene: Scene) -> bool:
+    """Whether any event closes a closure: its frames may be anywhere before."""
+    return any(isinstance(action, Dock) for event in scene.events for action in event.actions)
 
 
 def watchable(scene: Scene) -> dict[str, str]:

@@ -112,6 +112,8 @@ def _replaced(old: Any, new: Any, path: str) -> Any:
         if not isinstance(new, str):
             raise PathError(f'parameter "{path}" is a string: give one, not {new!r}')
         return new
+    if isinstance(old, bool):
+        raise PathError(f'parameter "{path}" is true or false: write it into the scene; in a run events change it')
     if isinstance(new, bool) or not isinstance(new, Real):
         raise PathError(f'parameter "{path}" is a number: give one, not {new!r}')
     return number_at(path, old, float(new))

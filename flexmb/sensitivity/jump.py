@@ -17,7 +17,7 @@ from typing import NamedTuple, assert_never
 import numpy as np
 
 from flexmb.run.driver import Leg
-from flexmb.scene.events import Action, Change, EndRun, Impact, Latch, Release
+from flexmb.scene.events import Action, Change, Dock, EndRun, Impact, Latch, Release, Separate
 from flexmb.scene.schema import SceneEvent
 from flexmb.sensitivity.impulses import Striking
 from flexmb.sensitivity.law_rates import EventRates
@@ -141,8 +141,13 @@ def _acted(striking: Striking, action: Action, D: Real, restitution: Real | None
             held.pop(name, None)
             striking.free(name)
             return D
-        case Change() | EndRun():
+        case Change() | Separate() | EndRun():
             return D
+        case Dock(closure=name):
+            raise NotImplementedError(
+                f'an event closes closure "{name}": derivatives through an impulse that closes a closure are not '
+                "available; end the run before it, and differentiate what follows from the state after it"
+            )
         case _:
             assert_never(action)
 

@@ -30,6 +30,7 @@ from flexmb.integrate.problem import Leaping, Linear
 from flexmb.kept import kept
 from flexmb.scene import schema as s
 from flexmb.scene.problems import SceneWarning
+from flexmb.scene.tree import closes, opens
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm, Route
 from flexmb.system.derivative_evaluator import DerivativeRoute
@@ -322,11 +323,14 @@ class Constraints:
         return motion
 
     def _refuse_locked(self) -> None:
+        """ClosureError for a mechanism without freedom. One that events close or open is a structure: it is at rest."""
         if self.closures.rank < 0:
             self.initial_state  # noqa: B018 - determines the rank
         locked = self.closures.mobility == 0 < self.closures.rank  # a tree of welds is not locked by its closures
-        if locked and not np.any(self._system.constants.speed["prescribed"] >= 0):
-            names = ", ".join(map(called, self._system.scene.constraints))
+        system = self._system
+        is_meant = np.any(system.constants.speed["prescribed"] >= 0) or opens(system.scene) or closes(system.scene)
+        if locked and not is_meant:
+            names = ", ".join(map(called, system.scene.constraints))
             raise ClosureError(
                 f"{names} leave none of the {self._system.nu} free speeds: the mechanism is locked. Free a "
                 "hinge, or let bodies deform"

@@ -55,6 +55,7 @@ def kinds() -> dict[str, Kind]:
         "sampled controller": "a sampled controller", "law in Python": "a law of the user's",
         "closures": "closures", "closures, latch": "closures and events",
         "closures, sampled controller": "closures and a controller",
+        "a closure opens": "a closure that opens", "a closure closes": "a closure that closes",
     }  # fmt: skip
     found = scenes()
     return {name: _with_marker(*found[key]) for name, key in named.items()}

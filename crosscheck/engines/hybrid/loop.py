@@ -26,7 +26,19 @@ from crosscheck.engines.hybrid.stepping import ArcStep, ArcStepper, Stopped
 from crosscheck.engines.links import Link, Scalar, links
 from crosscheck.engines.rigid_tree import Slot, TreeState
 from flexmb.scene.functions import Constant, Function
-from flexmb.scene.schema import Action, Change, Controller, EndRun, Impact, Latch, Release, Scene, SceneEvent
+from flexmb.scene.schema import (
+    Action,
+    Change,
+    Controller,
+    Dock,
+    EndRun,
+    Impact,
+    Latch,
+    Release,
+    Scene,
+    SceneEvent,
+    Separate,
+)
 from flexmb.typing import Real
 
 # Links whose coordinates events hold or let go: what is held is prescribed to be constant, its motor off.
@@ -258,8 +270,8 @@ class HybridMotion:
                 for each in self._let_go:
                     chain = freed(chain, self._slot(each), chain)
                 self._change(scene, as_held(phase.chain, chain, [self._slot(each) for each in self._held]))
-            case EndRun():
-                raise NotImplementedError("an end of the run, which `refusal` refuses, has reached the loop")
+            case EndRun() | Separate() | Dock():
+                raise NotImplementedError(f"{action}, which `refusal` refuses, has reached the loop")
             case _:
                 assert_never(action)
 

@@ -12,6 +12,7 @@ from flexmb.scene.schema import (
     Change,
     CoordinateSensor,
     DistanceSensor,
+    Dock,
     DriveSensor,
     EndRun,
     Impact,
@@ -21,6 +22,7 @@ from flexmb.scene.schema import (
     Release,
     Scene,
     SceneEvent,
+    Separate,
     TimeSensor,
     UserLaw,
 )
@@ -75,6 +77,8 @@ def _of_event(scene: Scene, event: SceneEvent, names: dict[str, tuple[str, int]]
             case Change(path=path):
                 if path.split(".")[-1] in ("period_s", "offset_s", "delay_s"):
                     yield f'event "{event.name}": the loop of the peers keeps the instants of controllers'
+            case Separate() | Dock():
+                yield f'event "{event.name}": closures in the loop of the peers are closed at all times'
             case _:
                 assert_never(action)
 

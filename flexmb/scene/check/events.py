@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from flexmb.scene.check.control import named, one_number, widths_of
 from flexmb.scene.check.walk import entries, sound
-from flexmb.scene.events import Change, Impact, Latch, Release
+from flexmb.scene.events import Change, Dock, Impact, Latch, Release, Separate
 from flexmb.scene.problems import Defect, Place, closest
 from flexmb.scene.schema import Scene, SceneEvent
 from flexmb.scene.stops import leaves, leaving, load_of, resting, stop_sensor
@@ -15,7 +15,8 @@ from flexmb.scene.values import PathError, with_values
 
 
 def events(scene: Scene) -> Iterator[Defect]:
-    """Every event watches an existing signal, and its actions are possible."""
+    """Every event watches an existing signal, and its actions are possible; what is open may close."""
+    yield from _open_closures(scene)
     if not scene.events:
         return
     paths = scalar_paths(scene)
@@ -32,6 +33,16 @@ def events(scene: Scene) -> Iterator[Defect]:
             what = "more than one stop is to rest on: their loads would have the same name"
             yield Defect(str(place.key("actions")), what, "give each stop an event of its own")
     yield from _names_of_stops(scene)
+
+
+def _open_closures(scene: Scene) -> Iterator[Defect]:
+    """A closure that is open is one that events open or close: a scene without events is the same at all times."""
+    actions = [action for _, event in sound(scene, "events") for action in event.actions]
+    named_by_events = {action.closure for action in actions if isinstance(action, Separate | Dock)}
+    for place, closure in sound(scene, "closures"):
+        if not closure.closed and closure.name not in named_by_events:
+            what, remedy = "it is open, and no event closes it", "give an event with a dock action, or leave it out"
+            yield Defect(str(place.key("closed")), what, remedy)
 
 
 def _names_of_stops(scene: Scene) -> Iterator[Defect]:
@@ -68,6 +79,11 @@ def _actions(scene: Scene, place: Place, event: SceneEvent, paths: dict[str, str
         if isinstance(action, Latch | Release | Impact) and action.coordinate not in paths:
             what = f'there is no scalar coordinate "{action.coordinate}"'
             yield Defect(str(spot.key("coordinate")), what, closest(action.coordinate, paths))
+        if isinstance(action, Separate | Dock):
+            closures = [closure.name for closure in scene.closures]
+            if action.closure not in closures:
+                what = f'there is no closure "{action.closure}"'
+                yield Defect(str(spot.key("closure")), what, closest(action.closure, closures))
         if isinstance(action, Change):
             yield from _change(scene, spot, action)
 

@@ -30,6 +30,7 @@ from tests.flexmb.control import test_closed_chains as closed_loops
 from tests.flexmb.control.scenes import pendulum, rotor
 from tests.flexmb.control.test_satellite import craft
 from tests.flexmb.control.test_taken_up import CONTINUOUS, SAMPLED
+from tests.flexmb.run.test_docking import flung, gap
 from tests.flexmb.run.test_events import arm, latch
 from tests.flexmb.run.test_events_of_signals import ball, floor
 from tests.flexmb.run.test_events_on_chains import four_bar, on
@@ -66,6 +67,8 @@ def scenes() -> dict[str, tuple[fm.Scene, float]]:
         "a law of flexmb's own": (craft().scene(), 0.02),
         "a controller that is watched": (rotor(law, said), 0.02),
         "closures": (looped(), 0.02),
+        "a closure that opens": (flung(), 1.4),
+        "a closure that closes": (gap(tolerance_m=0.03, tolerance_rad=0.03), 0.6),
         "closures and events": (four_bar(latched, release), 0.5),
         "closures and a controller": (closed_loops.windows(1, closed_loops.SAMPLED), 0.06),
         "a leap": (windows(1, 40.0, gravity=0.0), 0.06),
