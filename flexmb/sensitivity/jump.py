@@ -146,7 +146,7 @@ def _acted(striking: Striking, action: Action, D: Real, restitution: Real | None
         case Dock(closure=name):
             raise NotImplementedError(
                 f'an event closes closure "{name}": derivatives through an impulse that closes a closure are not '
-                "available; end the run before it, and differentiate what follows from the state after it"
+                "available; end the run before it, and give what follows as a scene that starts in the state after it"
             )
         case _:
             assert_never(action)

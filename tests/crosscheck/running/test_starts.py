@@ -99,10 +99,19 @@ def latched(scene: s.Scene) -> s.Scene:
     return msgspec.structs.replace(scene, events=(s.SceneEvent(name="stop", watch="time", level=0.1, actions=stops),))
 
 
+def docked(scene: s.Scene) -> s.Scene:
+    """A second pin beside the first one closes at 0.1 s: how they share the force is open from then on."""
+    spare = msgspec.structs.replace(scene.closures[0], name="spare", closed=False)
+    docks = s.Dock(closure="spare", tolerance_m=1e-6, tolerance_rad=1e-6)
+    event = s.SceneEvent(name="stop", watch="time", level=0.1, actions=(docks,))
+    return msgspec.structs.replace(scene, closures=(*scene.closures, spare), events=(event,))
+
+
 DETERMINED = load_scene(Path(__file__).parents[3] / "cases" / "closed_chains" / "four_bar" / "scene.toml")
 SCENES = {
     "plane": mechanisms.four_bar(), "determined": DETERMINED, "flexible": mechanisms.four_bar(modes=2),
     "driven": pendulum("weld", driven=s.Constant(value=0.0)), "latched": latched(DETERMINED),
+    "docked": docked(DETERMINED),
 }  # fmt: skip
 
 
@@ -121,7 +130,7 @@ def by_run(scene: s.Scene) -> Openness:
 def test_what_is_open_is_what_the_run_finds_open(name):
     found = undetermined(SCENES[name], 0.2)
     assert found == by_run(SCENES[name])
-    assert bool(found) == (name in ("plane", "driven", "latched"))
+    assert bool(found) == (name in ("plane", "driven", "latched", "docked"))
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -140,8 +149,9 @@ def test_components_of_random_loops(seed):
     assert undetermined(scene) == Openness.of_flags(flags)
 
 
-def test_a_latch_opens_nothing_before_it_happens():
-    assert undetermined(SCENES["latched"], 0.05) == NOTHING_OPEN == undetermined(SCENES["latched"])
+@pytest.mark.parametrize("name", ["latched", "docked"])
+def test_a_latch_or_a_second_pin_opens_nothing_before_it_happens(name):
+    assert undetermined(SCENES[name], 0.05) == NOTHING_OPEN == undetermined(SCENES[name])
 
 
 def test_a_tree_has_none():
