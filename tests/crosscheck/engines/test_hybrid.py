@@ -18,6 +18,7 @@ from crosscheck.judging.uncertainty import RungSignal, estimate
 from crosscheck.judging.verdict import Finding, Signal, compare
 from flexmb.scene.schema import Scene
 from tests.crosscheck.engines.peers import installed
+from tests.repo.project import ROOT
 
 PEERS = ("pinocchio", "mujoco")
 FINE = {
@@ -235,5 +236,15 @@ def test_what_the_loop_has_not_is_refused_by_name() -> None:
             *plain.controllers, item,
         ).scene()  # fmt: skip
         assert refusal(scene).startswith(named), refusal(scene)
+        for peer in PEERS:
+            assert CheckedEngine(installed(peer)).supports(scene).kind == "no"
+
+
+def test_closures_that_open_or_close_are_refused_by_name() -> None:
+    opened = fm.load_scene(ROOT / "cases" / "spacecraft" / "separation" / "scene.toml")
+    closed = fm.SceneEvent(name="closes", watch="time", level=1.0, actions=(fm.Dock(closure="clamp"),))
+    docked = fm.SceneBuilder("closes").add(*opened.bodies, *opened.hinges, *opened.closures, closed).scene()
+    for scene in (opened, docked):
+        assert refusal(scene).endswith("closures in the loop of the peers are closed at all times")
         for peer in PEERS:
             assert CheckedEngine(installed(peer)).supports(scene).kind == "no"
