@@ -14,4 +14,7 @@ INTEGRATORS: dict[str, Integrator] = {
 
 def integrator(name: str) -> Integrator:
     """The integrator with this name; ValueError for an unknown name."""
-    return INTEGRATORS[arguments.one_of("method", name, INTEGRATORS)]
+    try:
+        return INTEGRATORS[name]
+    except (KeyError, TypeError):
+        return INTEGRATORS[arguments.one_of("method", name, INTEGRATORS)]  # says which there are

@@ -105,7 +105,7 @@ class Driver:
                 return self._over_after_events(instant)
             begin = self._situation.going_on(instant.raw)
         while True:
-            starting = begin._replace(y=begin.y.copy())
+            starting = begin if self.course is None else begin._replace(y=begin.y.copy())
             segment = self._after_sample(self._next(begin))
             self._keep_leg(starting, segment.raw, segment.early)
             match segment.end:

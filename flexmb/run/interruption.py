@@ -98,6 +98,11 @@ _own = threading.local()
 """`stop`: the `Stop` that covers the runs of a thread."""
 
 
+def is_handed_over() -> bool:
+    """Whether `interruptible` has another thread run what it is given."""
+    return threading.current_thread() is threading.main_thread()
+
+
 def interruptible(run: Callable[..., Any], arguments: tuple[Any, ...], stop: Index | Stop) -> tuple[Any, bool]:
     """The result of `run`, and whether Ctrl-C was pressed, in which case stop[0] = 1 asks `run` to return soon.
 
@@ -105,7 +110,7 @@ def interruptible(run: Callable[..., Any], arguments: tuple[Any, ...], stop: Ind
     thread, and the main one waits. When called from another thread, `run` is executed there, and is interrupted only if
     a `Stop` covers the runs of that thread.
     """
-    if threading.current_thread() is not threading.main_thread():
+    if not is_handed_over():
         cover: Stop | None = getattr(_own, "stop", None)
         if cover is not None and not isinstance(stop, Stop):
             return cover.run(run, arguments, stop)

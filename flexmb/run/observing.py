@@ -53,12 +53,15 @@ def batch(observed: Observed, motion: tuple[Any, ...], observing: Any, n: int) -
     return lambda times, states, rows: call(where, workspace.doubt, times, states, slope, rows)
 
 
-def observe(system: Observed, algorithm: Algorithm, times: Real, states: Real, sampled: Sampler | None) -> Rows:
+def observe(
+    system: Observed, algorithm: Algorithm, times: Real, states: Real, sampled: Sampler | None, many: int = 1
+) -> Rows:
     """Rows at all states (T,n), which belong to the first T of these times, up to a failure or Ctrl-C.
 
-    `sampled` evaluates many samples at once; those it leaves out are evaluated singly, with their errors and warnings.
+    `sampled` evaluates many samples at once, at first `many`; those it leaves out are evaluated singly, with their
+    errors and warnings.
     """
-    rows, done, many = np.zeros((len(states), system.observation.width)), 0, 1
+    rows, done = np.zeros((len(states), system.observation.width)), 0
     try:
         while done < len(states):
             if sampled is not None:

@@ -6,7 +6,7 @@ from itertools import repeat
 from time import perf_counter
 
 from flexmb.integrate.control import ACCEPTED, EVALUATIONS, FACTORISATIONS, JACOBIANS, REJECTED
-from flexmb.run.observing import observe
+from flexmb.run.observing import PATIENCE, observe
 from flexmb.run.propagate import Integration, Raw
 from flexmb.run.provenance import with_drives
 from flexmb.run.run_arrays import Statistics, fitting, told
@@ -18,11 +18,16 @@ from flexmb.tables.state import DynamicsError, NotFiniteError
 from flexmb.tables.status import Status
 from flexmb.typing import Real
 
+CHEAPER = 0.05
+"""Samples that are evaluated at first, over the evaluations of the motion for which there is time between two looks at
+the keyboard: the outputs of a state take no longer than ten of these."""
+
 
 def observed(system: System, times: Real, raw: Raw, algorithm: Algorithm, solve: Integration) -> Trajectory:
     """The trajectory of an integration by `solve`: all observables at the samples reached, a subset of `times`."""
     start = perf_counter()
-    rows, trouble = observe(solve.feedback or system, algorithm, times, raw.states, solve.batch)
+    many = int(CHEAPER * PATIENCE * raw.counts[EVALUATIONS] / raw.run_s) if raw.run_s else 1
+    rows, trouble = observe(solve.feedback or system, algorithm, times, raw.states, solve.batch, max(1, many))
     status, stopped_at, message = raw.status, raw.t, ending(system, raw.status, raw.fault, raw.t)
     if trouble is not None and not (isinstance(trouble, NotFiniteError) and status is not Status.OK):
         status, stopped_at = _why(trouble), float(times[len(rows)])

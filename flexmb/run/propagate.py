@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from flexmb.entry import articulated
-from flexmb.integrate.control import COUNTS, SAMPLES, STOP
+from flexmb.integrate.control import ACCEPTED, COUNTS, REJECTED, SAMPLES, STOP
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.memory import Memory, memory
 from flexmb.integrate.problem import Accuracy, Clock, Linear, Problem, problem, stiff_problem
@@ -19,7 +19,7 @@ from flexmb.integrate.recorded import FastestStates, RecordedSteps, fastest_stat
 from flexmb.integrate.settings import Settings
 from flexmb.integrate.watch import CROSSED, Watch, nothing_watched
 from flexmb.motion import coordinates
-from flexmb.run.interruption import interruptible
+from flexmb.run.interruption import interruptible, is_handed_over
 from flexmb.run.observing import Sampler, batch
 from flexmb.run.origin import Beginning
 from flexmb.run.restart import refuse_other_division
@@ -39,8 +39,25 @@ if TYPE_CHECKING:
 
 
 NO_STATES: Real = np.zeros((0, 0))
+
+
+class Pace(NamedTuple):
+    """What the last run by an integration took for each second of its motion: seconds, and steps."""
+
+    seconds: float
+    steps: float
+
+
+Integrated = tuple[Real, Clock, Accuracy, Real, Index, Memory, Watch]
+"""What an integrator takes after its problem."""
+TINY = float(np.finfo(float).tiny)
 PARTS = 32
 """Of a run's time, in each of which watches of accuracy look at the states that turn and that bend most."""
+SHORT = 0.005
+"""s that a run may take, by the last one of its kind, and still be integrated in the caller's thread: to hand it over
+to another one takes 0.15 ms, and a person cannot tell whether Ctrl-C waited for so short a time."""
+FEW_MORE = 20
+"""Steps that such a run may take beyond twice those of the last one."""
 
 
 class Raw(NamedTuple):
@@ -120,7 +137,9 @@ class Integration:
         self._enter: Any = None  # the compiled integrator
         self._kept = kept_for_watches(system)
         self._posed, self._record = self._recording()
-        self._at_first = [(array, array.copy()) for array in route.remembered(constants)]
+        self._remembered = list(route.remembered(constants))
+        self._at_first = [array.copy() for array in self._remembered]
+        self._pace = Pace(np.inf, np.inf)
 
     @property
     def size(self) -> int:
@@ -134,6 +153,38 @@ class Integration:
         if self._record is not None:
             self._record.fastest.begin(given[1].times)
         return self._enter(self._posed, *given)
+
+    def run(self, given: Integrated, once: bool) -> tuple[tuple[int, float], bool]:
+        """The status and time of an integration, compiled before, and whether Ctrl-C ended it; once: whether it cannot
+        begin anew, as its watch or the memory of an earlier run changes on the way, like that of controllers.
+
+        A run that is expected to be short, by the one before, is not handed over to another thread, but has a bound of
+        its steps. If it reaches that bound, or Ctrl-C is pressed meanwhile, it begins anew in the other thread.
+        """
+        y, clock, accuracy, out, counts, memory, watch = given
+        span, is_stopped = max(float(clock.times[-1] - clock.times[0]), TINY), False
+        if self._pace.seconds * span <= SHORT and not once and self.feedback is None and is_handed_over():
+            few = accuracy._replace(max_steps=min(accuracy.max_steps, FEW_MORE + int(2.0 * self._pace.steps * span)))
+            changing = y, *self._remembered
+            before, begun = [array.copy() for array in changing], perf_counter()
+            try:
+                found = self(y, clock, few, out, counts, memory, watch)
+            except KeyboardInterrupt:
+                is_stopped = True
+            else:
+                if found[0] != Status.MAX_STEPS or few.max_steps == accuracy.max_steps:
+                    self._keep_pace(perf_counter() - begun, counts, span)
+                    return found, False
+            for array, was in zip((*changing, counts, *memory), (*before, *[0] * (1 + len(memory))), strict=True):
+                array[...] = was
+            counts[STOP] = is_stopped
+        begun = perf_counter()
+        found, interrupted = interruptible(self, given, counts[STOP : STOP + 1])
+        self._keep_pace(perf_counter() - begun, counts, span)
+        return found, interrupted or is_stopped
+
+    def _keep_pace(self, seconds: float, counts: Index, span: float) -> None:
+        self._pace = Pace(seconds / span, float(counts[ACCEPTED] + counts[REJECTED]) / span)
 
     def watching(self, watch: Watch) -> Watch:
         """The same watch with access to the signals of a run that has begun."""
@@ -156,7 +207,7 @@ class Integration:
 
     def forget(self) -> None:
         """Restore the initial state: closed chains store the branch that they are on."""
-        for array, at_first in self._at_first:
+        for array, at_first in zip(self._remembered, self._at_first, strict=True):
             array[...] = at_first
 
     def compile(self, *given: Any) -> None:
@@ -264,7 +315,7 @@ def integrate(
     start = perf_counter()
     solve.compile(*given)
     begun = perf_counter()
-    (status, t), interrupted = interruptible(solve, given, counts[STOP : STOP + 1])
+    (status, t), interrupted = solve.run(given, once=watch is not None or begin.memory is not None)
     end = perf_counter()
     paused = status == CROSSED
     if t > times[-1] and (paused or status == OK):

@@ -249,7 +249,8 @@ def fitting(kind: type[Run], parts: dict[str, Any]) -> Run:
 
 def told(run: Run, **words: Any) -> Run:
     """The run with other fields that are no arrays."""
-    return fitting(type(run), {name: getattr(run, name) for name in run.__dataclass_fields__} | words)
+    held = run.__dict__
+    return fitting(type(run), {name: held[name] for name in run.__dataclass_fields__ if name in held} | words)
 
 
 def refuse_torn(run: RunArrays) -> None:

@@ -125,9 +125,10 @@ class Segments:
         before its instant: the segment is integrated again, to a position far enough from the singular one.
         """
         stop, due = self._agenda.next_stop(begin.state.t)
-        again = begin._replace(y=begin.y.copy())
+        may_be_early = due and self._situation.system.scene.constraints
+        again = begin._replace(y=begin.y.copy()) if may_be_early else begin
         segment = self._to(stop, begin, due)
-        if due and self._situation.system.scene.constraints:
+        if may_be_early:
             early = too_near(self._situation, self._left, segment.raw, again.state.t, stop)
             if early:
                 segment = self._to(stop - early, again, due)
@@ -149,8 +150,13 @@ class Segments:
                     raw, early = placed(self._situation, self._left, raw, levels, times)
                 elif levels.leap[0] < raw.t < levels.leap[1]:
                     raw = raw._replace(memory=None)  # the run ends within a leap, from which it cannot be resumed
-            kept = shown[: len(raw.states)]
-            part = self._situation.observed(raw._replace(states=raw.states[kept]), times[: len(kept)][kept], solve)
+            seen = raw
+            if shown is None:
+                times = times[: len(raw.states)]
+            else:
+                kept = shown[: len(raw.states)]
+                seen, times = raw._replace(states=raw.states[kept]), times[: len(kept)][kept]
+            part = self._situation.observed(seen, times, solve)
         if part.status is not Status.OK or raw.interrupted:
             return Segment(SegmentEnd.FAILURE, raw, levels, part, [], early)
         if found:
@@ -159,13 +165,14 @@ class Segments:
         assert is_over or raw.t == self._agenda.until  # nothing else stops a segment
         return Segment(SegmentEnd.TIME if is_over else SegmentEnd.LEAP, raw, levels, part, found, early)
 
-    def _output(self, begin: Beginning, stop: float) -> tuple[Real, Flags]:
-        """Times (K,) s from the start of a segment to its stop, and which of them are output times of the run."""
+    def _output(self, begin: Beginning, stop: float) -> tuple[Real, Flags | None]:
+        """Times (K,) s from the start of a segment to its stop, and which of them are output times of the run; None of
+        all."""
         start, is_last = begin.state.t, stop == self._times[-1]
         if begin.memory is not None:
             start = max(start, self._times[0])
         if is_last and start == self._times[0]:
-            return self._times, np.ones(len(self._times), bool)
+            return self._times, None
         wanted = self._times[(self._times >= start) & ((self._times < stop) | is_last)]
         times = np.unique([start, *wanted, stop])
         return times, np.isin(times, wanted)

@@ -235,6 +235,8 @@ def _followed(
 def _looked_at(system: System, made: Made) -> tuple[Trajectory, list[Warning], bool]:
     """Trajectory, warnings and interruption, with what watches of accuracy say of the samples and the fastest steps."""
     trajectory, warned, was_interrupted, fastest = made
+    if system.is_rigid:
+        return trajectory, warned, was_interrupted
     t, q, u = trajectory.t, trajectory.q, trajectory.u
     failed = not trajectory.finished
     seen = WatchedStates(system, t, q, u, lambda n: system.turns(float(t[n]), q[n], u[n]), failed, trajectory.loads)

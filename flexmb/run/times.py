@@ -28,13 +28,14 @@ from flexmb.typing import Real
 
 # Bytes per number, which is stored in a row and again by name; bytes per sample for its time and for NumPy's overhead.
 _NUMBER_BYTES, _SAMPLE_BYTES = 16, 200
+_APART = 1e-12  # of the largest time, between samples that rounding cannot bring to the same one
 _FEWER = "ask for fewer, or divide the run into several"
 
 
 def sample_times(samples: int | Sequence[float] | Real, t_end: float, t_start: float = 0.0) -> Real:
     """Output times (T,) from t_start to t_end (s); samples: their number, or the times. ValueError or TypeError for
     invalid ones."""
-    if np.ndim(samples) == 0:
+    if type(samples) is int or np.ndim(samples) == 0:
         number = arguments.whole("samples", samples)
         if number < 2:
             raise ValueError(f"samples is {number}: ask for at least 2 output times, the start and the end")
@@ -42,7 +43,7 @@ def sample_times(samples: int | Sequence[float] | Real, t_end: float, t_start: f
         steps = np.arange(number, dtype=np.float64)  # as `linspace`, which takes three times as long
         equal: Real = steps * ((t_end - t_start) / (number - 1)) + t_start
         equal[-1] = t_end
-        if _increase(equal):
+        if t_end - t_start > number * _APART * max(abs(t_start), abs(t_end)) or _increase(equal):
             return equal
         raise ValueError(f"samples is {number}: too many to be distinct from {t_start:g} to t_end = {t_end:g} s")
     times = arguments.array("samples", samples)

@@ -68,7 +68,7 @@ class Linearisation:
             at = self._sound(t, y, variations.of_accelerations(t, y), variations)
         else:
             at = self._under_forces(self._variation(t, y), t, y, self._system.layout.rates("forces", forces))
-        return AccelerationDerivatives(at.accelerations, *at.of_accelerations, at.motion)
+        return AccelerationDerivatives.known(at.accelerations, at.of_accelerations, at.motion)
 
     def evaluator(self) -> DerivativeEvaluator:
         """See `System.derivative_evaluator`."""
@@ -195,10 +195,23 @@ class Linearisation:
     def _differentiable(self, state: State, what: str) -> tuple[float, Real]:
         """Time and y of a state at which derivatives exist; NotImplementedError for scenes with controllers, ValueError
         for a scene with so many speeds that a matrix of derivatives would be too large."""
+        if not self._is_admitted:
+            self._admit(what)
+        return self._without_kinks(state, what)
+
+    @kept
+    def _is_admitted(self) -> bool:
+        """Whether `_admit` raises nothing, which is so for all states or for none."""
+        try:
+            self._admit("derivatives")
+        except (ValueError, NotImplementedError):
+            return False
+        return True
+
+    def _admit(self, what: str) -> None:
         fewer = "take a scene of fewer bodies or modes: derivatives by all speeds are dense"
         refuse_large_matrix(self._system.nu, what, fewer)
         refuse_feedback(self._system.scene, what, INSTEAD)
-        return self._without_kinks(state, what)
 
     def _without_kinks(self, state: State, what: str) -> tuple[float, Real]:
         """The same for what is driven by given values; NotImplementedError for chains of bodies whose inertia is not

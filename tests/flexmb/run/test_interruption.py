@@ -19,7 +19,7 @@ import flexmb.run.observing as observing
 import flexmb.run.propagate as propagation
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.run.interruption import interruptible
-from flexmb.run.warm_up import pendulum
+from flexmb.run.warm_up import looped, pendulum
 from flexmb.tables.status import Status
 
 ROOT = Path(__file__).parents[3]
@@ -233,6 +233,84 @@ def test_in_another_thread_a_run_is_called_there():
     thread.start()
     thread.join()
     assert found == [(thread.ident, False)]
+
+
+def same(one: fm.Trajectory, other: fm.Trajectory) -> bool:
+    """Whether the numbers of two runs are equal to the last bit, and what they have cost."""
+    cost = ("evaluations", "accepted_steps", "rejected_steps", "jacobians", "factorisations")
+    return all(np.array_equal(getattr(one, name), getattr(other, name)) for name in ("t", "q", "u", "work")) and all(
+        getattr(one.statistics, name) == getattr(other.statistics, name) for name in cost
+    )
+
+
+@pytest.fixture
+def handed_over(monkeypatch):
+    """The runs that were handed over to another thread: their bounds of steps."""
+    found, whole = list[int](), propagation.interruptible
+
+    def noted(run, given, stop):
+        found.append(given[2].max_steps)
+        return whole(run, given, stop)
+
+    monkeypatch.setattr(propagation, "interruptible", noted)
+    return found
+
+
+@pytest.mark.parametrize("method", ["dop853", "rk4", "radau5", "exponential", "generalised_alpha"])
+def test_a_run_that_is_short_by_the_one_before_is_integrated_where_it_is_called(method, handed_over):
+    step = {"step": 0.01} if INTEGRATORS[method].fixed else {}
+    system = fm.compile(pendulum())
+    first = fm.simulate(system, 0.1, method, samples=3, **step)
+    fm.simulate(system, 0.1, method, samples=3, **step)  # the first one may have waited for a kernel
+    before = len(handed_over)
+    assert before >= 1
+    assert same(first, fm.simulate(system, 0.1, method, samples=3, **step))
+    assert len(handed_over) == before
+
+
+@pytest.mark.parametrize("made", [pendulum, looped])
+def test_a_run_that_is_longer_than_expected_begins_anew(made, handed_over, monkeypatch):
+    """By tolerances that take eight times the steps, after runs that took few; a bound of one's own is kept."""
+    monkeypatch.setattr(propagation, "SHORT", 60.0)
+    exact = {"rtol": 1e-13, "atol": 1e-13}
+    expected = fm.simulate(fm.compile(made()), 3.0, samples=7, **exact)
+    system = fm.compile(made())
+    coarse = fm.simulate(system, 3.0, samples=7, rtol=1e-2, atol=1e-2).statistics
+    fine = expected.statistics
+    expected_steps = propagation.FEW_MORE + 2 * (coarse.accepted_steps + coarse.rejected_steps)
+    assert fine.accepted_steps + fine.rejected_steps > expected_steps
+    del handed_over[:]
+    assert same(expected, fm.simulate(system, 3.0, samples=7, **exact))
+    assert len(handed_over) == 1
+    assert same(expected, fm.simulate(system, 3.0, samples=7, **exact))  # by now it is known how long it takes
+    stopped = fm.simulate(system, 3.0, samples=7, max_steps=3, **exact)
+    assert stopped.status is Status.MAX_STEPS and stopped.statistics.accepted_steps <= 3
+    assert len(handed_over) == 1
+
+
+@pytest.mark.usefixtures("keyboard")
+def test_ctrl_c_during_a_short_run_is_not_swallowed(handed_over, monkeypatch):
+    system, whole = fm.compile(pendulum()), propagation.Integration.__call__
+    for _ in range(2):
+        fm.simulate(system, 0.1)
+    before = len(handed_over)
+
+    def pressed(self, *given):
+        found = whole(self, *given)
+        if threading.current_thread() is threading.main_thread():
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.05)
+        return found
+
+    monkeypatch.setattr(propagation.Integration, "__call__", pressed)
+    with pytest.raises(fm.Interrupted) as stopped:
+        fm.simulate(system, 0.1)
+    run = stopped.value.trajectory
+    assert run.status is Status.INTERRUPTED and len(run.t) == 1 and run.stopped_at == 0.0
+    assert len(handed_over) == before + 1
+    monkeypatch.undo()
+    whole_run, later = fm.simulate(system, 0.1), fm.simulate(system, 0.1, state=run.restart)
+    assert np.array_equal(later.q, whole_run.q) and np.array_equal(later.u, whole_run.u)
 
 
 def test_what_was_interrupted_survives_pickling():
