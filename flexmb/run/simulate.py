@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import NamedTuple, TypedDict, Unpack
 
@@ -211,7 +210,7 @@ def _run(
     warned: list[Warning] = [SceneWarning(doubt) for doubt in driver.doubts]
     if start is not None and start.is_low:
         warned.append(PrecisionWarning(start.warning))
-        trajectory = replace(trajectory, message=f"{trajectory.message}; at the start {start.warning}")
+        trajectory = told(trajectory, message=f"{trajectory.message}; at the start {start.warning}")
     return Made(trajectory, warned, driver.was_interrupted, driver.fastest)
 
 
@@ -243,7 +242,7 @@ def _looked_at(system: System, made: Made) -> tuple[Trajectory, list[Warning], b
     seen = seen._replace(fastest=np.vstack(fastest)) if fastest and not failed else seen
     for finding in said(seen):
         warned = [*warned, SceneWarning(f'scene "{system.scene.name}": {finding}')]
-        trajectory = replace(trajectory, message=f"{trajectory.message}; {finding}")
+        trajectory = told(trajectory, message=f"{trajectory.message}; {finding}")
     return trajectory, warned, was_interrupted
 
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from flexmb.typing import Real
+from flexmb.typing import Index, Real
 
 
 def cross_matrix(a: Real) -> Real:
@@ -37,6 +37,9 @@ def rotation_matrix(quaternion: ArrayLike) -> Real:
     return R
 
 
+_CYCLIC: Index = np.array([(0, 1, 2), (1, 2, 0), (2, 0, 1)])
+
+
 def quaternion_of(R: Real) -> Real:
     """Unit quaternions (...,4) of rotation matrices (...,3,3), with the sign that makes the first nonzero positive.
 
@@ -44,17 +47,18 @@ def quaternion_of(R: Real) -> Real:
     (2008) 440.
     """
     trace = np.trace(R, axis1=-2, axis2=-1)
-    i, j, k = np.array([(0, 1, 2), (1, 2, 0), (2, 0, 1)]).T
+    i, j, k = _CYCLIC
     candidates = np.empty((*np.shape(R)[:-2], 4, 4))  # row r is 4 q_r times the quaternion
     candidates[..., 0, 0] = 1.0 + trace
     candidates[..., 0, 1:] = candidates[..., 1:, 0] = R[..., k, j] - R[..., j, k]
     candidates[..., 1:, 1:] = R + np.swapaxes(R, -1, -2)
     candidates[..., 1 + i, 1 + i] = 1.0 - trace[..., None] + 2.0 * R[..., i, i]
-    largest = np.argmax(np.diagonal(candidates, axis1=-2, axis2=-1), axis=-1)
-    quaternion = np.take_along_axis(candidates, largest[..., None, None], axis=-2)[..., 0, :]
+    all_of_them = candidates.reshape(-1, 4, 4)
+    each = np.arange(len(all_of_them))
+    quaternion = all_of_them[each, np.argmax(np.diagonal(all_of_them, axis1=-2, axis2=-1), axis=-1)]
     quaternion /= np.linalg.norm(quaternion, axis=-1, keepdims=True)
-    first = np.take_along_axis(quaternion, np.argmax(quaternion != 0.0, axis=-1)[..., None], axis=-1)
-    return np.where(first < 0.0, -quaternion, quaternion)
+    quaternion[quaternion[each, np.argmax(quaternion != 0.0, axis=-1)] < 0.0] *= -1.0
+    return quaternion.reshape(*np.shape(R)[:-2], 4)
 
 
 def rotation_by(vector: ArrayLike) -> Real:

@@ -50,9 +50,9 @@ class WatchedStates(NamedTuple):
         if not len(more):
             return self.t, self.q, self.u
         return (
-            np.r_[self.t, more[:, 0]],
-            np.vstack([self.q, more[:, 1 : 1 + nq]]),
-            np.vstack([self.u, more[:, 1 + nq :]]),
+            np.concatenate([self.t, more[:, 0]]),
+            np.concatenate([self.q, more[:, 1 : 1 + nq]]),
+            np.concatenate([self.u, more[:, 1 + nq :]]),
         )
 
 

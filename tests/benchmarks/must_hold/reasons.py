@@ -32,7 +32,7 @@ REASONS = (
     ),
     Reason(
         ("dop853_1e-06", "equal_error_cpp_1e-06", "equal_error_cpp_1e-10"),
-        "of 0.48 ms at a tolerance of 1e-6, 414 evaluations take 0.30 ms, the sums of the stages 0.03, and Python 0.15, "
+        "of 0.48 ms at a tolerance of 1e-6, 414 evaluations take 0.30, the sums of the stages 0.03, and Python 0.15, "
         "where the rival is a bare call: 176 calls of functions, which check arguments, observe two samples and make "
         "records. Without them the ratio would be 4. An evaluation is six thousand operations, 8.4 in a nanosecond, "
         "where the processor completes 10 that are not vectors.",
@@ -40,8 +40,8 @@ REASONS = (
     Reason(
         ("equal_error_scipy_1e-06", "equal_error_scipy_1e-10"),
         "the goal is that of SciPy's DOP853 at equal tolerance on another processor, where 77 to 80 % of the rival's "
-        "time were SciPy's; on this one they are 58 to 66 %. The tuner takes LSODA, whose loop is compiled. Of a run at "
-        "1e-6 a third is Python, at 1e-10 a seventh; without it the ratios would be 9 and 8.4.",
+        "time were SciPy's; on this one they are 58 to 66 %. The tuner takes LSODA, whose loop is compiled. Of a run "
+        "at 1e-6 a third is Python, at 1e-10 a seventh; without it the ratios would be 9 and 8.4.",
     ),
     Reason(
         ("ffrf_boom_0.01", "ffrf_boom_0.001"),
@@ -104,8 +104,8 @@ REASONS = (
     ),
     Reason(
         ("sensitivity_1",),
-        "operations. An evaluation of the motion takes 9.2 thousand (1.6 µs). With derivatives each product becomes two, "
-        "which makes 14 thousand instructions, whether they hold one derivative or seven: at least 2.8 µs, as this "
+        "operations. An evaluation of the motion takes 9.2 thousand (1.6 µs). With derivatives each product becomes "
+        "two, which makes 14 thousand instructions, whether they hold one derivative or seven: at least 2.8 µs, as the "
         "processor completes 5.1 in a nanosecond (measured by a product of matrices), and 4.9 in fact, as tables and "
         "workspace grow from 27 to 366 kB, beyond the first cache. In as many steps as the run's (72 thousand "
         "evaluations against 75: accuracy bounds both) the least is 0.20 s, beside 0.155 s for the run and 0.05 s for "
