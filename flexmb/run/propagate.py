@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 NO_STATES: Real = np.zeros((0, 0))
 
 
-class Pace(NamedTuple):
+class Tempo(NamedTuple):
     """What the last run by an integration took for each second of its motion: seconds, and steps."""
 
     seconds: float
@@ -139,7 +139,7 @@ class Integration:
         self._posed, self._record = self._recording()
         self._remembered = list(route.remembered(constants))
         self._at_first = [array.copy() for array in self._remembered]
-        self._pace = Pace(np.inf, np.inf)
+        self._tempo = Tempo(np.inf, np.inf)
 
     @property
     def size(self) -> int:
@@ -163,8 +163,8 @@ class Integration:
         """
         y, clock, accuracy, out, counts, memory, watch = given
         span, is_stopped = max(float(clock.times[-1] - clock.times[0]), TINY), False
-        if self._pace.seconds * span <= SHORT and not once and self.feedback is None and is_handed_over():
-            few = accuracy._replace(max_steps=min(accuracy.max_steps, FEW_MORE + int(2.0 * self._pace.steps * span)))
+        if self._tempo.seconds * span <= SHORT and not once and self.feedback is None and is_handed_over():
+            few = accuracy._replace(max_steps=min(accuracy.max_steps, FEW_MORE + int(2.0 * self._tempo.steps * span)))
             changing = y, *self._remembered
             before, begun = [array.copy() for array in changing], perf_counter()
             try:
@@ -173,18 +173,18 @@ class Integration:
                 is_stopped = True
             else:
                 if found[0] != Status.MAX_STEPS or few.max_steps == accuracy.max_steps:
-                    self._keep_pace(perf_counter() - begun, counts, span)
+                    self._keep_tempo(perf_counter() - begun, counts, span)
                     return found, False
             for array, was in zip((*changing, counts, *memory), (*before, *[0] * (1 + len(memory))), strict=True):
                 array[...] = was
             counts[STOP] = is_stopped
         begun = perf_counter()
         found, interrupted = interruptible(self, given, counts[STOP : STOP + 1])
-        self._keep_pace(perf_counter() - begun, counts, span)
+        self._keep_tempo(perf_counter() - begun, counts, span)
         return found, interrupted or is_stopped
 
-    def _keep_pace(self, seconds: float, counts: Index, span: float) -> None:
-        self._pace = Pace(seconds / span, float(counts[ACCEPTED] + counts[REJECTED]) / span)
+    def _keep_tempo(self, seconds: float, counts: Index, span: float) -> None:
+        self._tempo = Tempo(seconds / span, float(counts[ACCEPTED] + counts[REJECTED]) / span)
 
     def watching(self, watch: Watch) -> Watch:
         """The same watch with access to the signals of a run that has begun."""
