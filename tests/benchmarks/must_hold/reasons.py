@@ -86,8 +86,8 @@ REASONS = (
     ),
     Reason(
         ("batch_aba", "batch_parallel"),
-        "operations. A copy takes six thousand, in 0.155 µs at best: 39 in a nanosecond, where two vector units complete 41 "
-        "that are not sums of products (82 with these, measured by a product of matrices). What computes for ten "
+        "operations. A copy takes six thousand, in 0.155 µs at best: 39 in a nanosecond, where two vector units do "
+        "41 that are not sums of products (82 with these, measured by a product of matrices). What computes for ten "
         "seconds gets special kernels by itself, which have fewer: 22 and 17 on another processor.",
     ),
     Reason(
