@@ -183,6 +183,7 @@ def _export_program(scene: Path, fmu: Path | None, c: Path | None, inputs: list[
     ):
         console.print(printable(f"{what}: {', '.join(names) or 'none'}"), soft_wrap=True)
     _tell(tuple(f"{name} is fixed: {why}" for name, why in model.numbers.fixed.items()))
+    _tell((model.open_loads,) if model.open_loads else ())
     console.print("wrote", str(fmu or c), soft_wrap=True)
 
 

@@ -45,7 +45,7 @@ def _lines(model: ExportedModel, guid: str, step: float, code: str) -> Iterator[
         f'modelIdentifier="{model.identifier}" canGetAndSetFMUstate="true" canSerializeFMUstate="true" '
         'providesDirectionalDerivative="false"'
     )
-    yield f'<ModelExchange {can} completedIntegratorStepNotNeeded="true"/>'
+    yield f'<ModelExchange {can} completedIntegratorStepNotNeeded="{str(not model.branch).lower()}"/>'
     if step:
         yield f'<CoSimulation {can} canHandleVariableCommunicationStepSize="true" canInterpolateInputs="false"/>'
     variables = list(_variables(model, step))

@@ -26,6 +26,8 @@ from flexmb.jit.processors import LEVELS
 LEVEL = "x86-64-v3"
 """The processors that exported code runs on: those with AVX2 and fused multiply-add (2013 and later)."""
 TRIPLE = "x86_64"
+OF_C = {"numba_nextafter": "nextafter"}
+"""Functions of numba's own library, and those of the C library in place of them."""
 
 
 def emitted(entries: Mapping[str, tuple[Callable[..., Any], tuple[Any, ...]]]) -> bytes:
@@ -87,7 +89,9 @@ def _link(whole: Any, library: Any, own: str, symbol: str, done: set[str]) -> No
 def _keep_only(module: Any, entries: set[str]) -> None:
     """Make all but the entries internal, and remove what they do not reach."""
     for function in module.functions:
-        if not function.is_declaration and function.name not in entries:
+        if function.is_declaration:
+            function.name = OF_C.get(function.name, function.name)
+        elif function.name not in entries:
             function.linkage = "internal"
     for variable in module.global_variables:
         if not variable.is_declaration:

@@ -25,7 +25,8 @@ class Image:
 
     words (B,): its contents as numbers of 64 bits, read as floats; stored: how many of them are not known to be zero.
     addresses (A,2): words that hold addresses, and the offsets (bytes) that these have. bundles: offset of each
-    bundle's table. arrays: offset and size (bytes) of each array, by bundle and name.
+    bundle's table. arrays: offset and size (bytes) of each array, by bundle and name. Bundles are those that are given,
+    then those that are members of others, in the order of `flattened`.
     """
 
     words: Real
@@ -49,7 +50,8 @@ class _Piece:
 
 
 def image(bundles: Sequence[Any], like: Image | None = None) -> Image:
-    """The block of these bundles, none of which holds others; with the arrangement of another one if it is given."""
+    """The block of these bundles and their members; with the arrangement of another one if it is given."""
+    bundles = flattened(bundles)
     owners = dict[int, _Piece]()
     for _, _, array in _arrays(bundles):
         key, start = id(_owner(array)), array.ctypes.data
@@ -90,15 +92,45 @@ def image(bundles: Sequence[Any], like: Image | None = None) -> Image:
     words = block.view(np.int64)
     for bundle, table in zip(bundles, tables, strict=True):
         rows = bundle.kernel_table.copy()
-        rows[:, 0] = 0
+        rows[..., :1] = 0
         words[table // ROW : table // ROW + rows.size] = rows.ravel()
     for number, name, array in _arrays(bundles):
         piece = owners[id(_owner(array))]
         at = piece.place + array.ctypes.data - piece.start
-        row = [field.name for field in fields(bundles[number])].index(name)
-        addresses.append((tables[number] // ROW + row * bundles[number].kernel_table.shape[1], at))
+        addresses.append((tables[number] // ROW + _address_of(bundles[number], name), at))
         arrays[number, name] = at, array.nbytes
+    for bundle, table in zip(bundles, tables, strict=True):
+        for name, member in _members(bundle):
+            addresses.append((table // ROW + _address_of(bundle, name), tables[number_of(bundles, member)]))
     return Image(block.view(np.float64), stored // ROW, np.array(addresses), tuple(tables), arrays)
+
+
+def flattened(bundles: Sequence[Any]) -> list[Any]:
+    """These bundles, then their members that are bundles, and the members of those; each once."""
+    found = list(bundles)
+    for bundle in found:
+        known = {each.kernel_address for each in found}
+        found += [member for _, member in _members(bundle) if member.kernel_address not in known]
+    return found
+
+
+def number_of(bundles: Sequence[Any], bundle: Any) -> int:
+    """The number of a bundle among those of an image."""
+    return [each.kernel_address for each in flattened(bundles)].index(bundle.kernel_address)
+
+
+def _members(bundle: Any) -> Iterator[tuple[str, Any]]:
+    """The members of a bundle that are bundles, by name."""
+    for field in fields(bundle):
+        member = getattr(bundle, field.name)
+        if not isinstance(member, np.ndarray):
+            yield field.name, member
+
+
+def _address_of(bundle: Any, name: str) -> int:
+    """The word in a bundle's table that holds the address of a member."""
+    row = [field.name for field in fields(bundle)].index(name)
+    return int(row * bundle.kernel_table.shape[1])
 
 
 def _arrays(bundles: Sequence[Any]) -> Iterator[tuple[int, str, Any]]:
@@ -106,8 +138,7 @@ def _arrays(bundles: Sequence[Any]) -> Iterator[tuple[int, str, Any]]:
     for number, bundle in enumerate(bundles):
         for field in fields(bundle):
             array = getattr(bundle, field.name)
-            assert isinstance(array, np.ndarray), "these bundles hold arrays only"
-            if array.size:
+            if isinstance(array, np.ndarray) and array.size:
                 yield number, field.name, array
 
 

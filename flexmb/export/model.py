@@ -7,9 +7,12 @@ from collections.abc import Iterator, Sequence
 from hashlib import sha256
 from typing import Any, NamedTuple
 
+import numpy as np
+
+from flexmb.closure.tables import Closed
 from flexmb.export import entry
 from flexmb.export.emitted import emitted
-from flexmb.export.image import ROW, Image, image
+from flexmb.export.image import ROW, Image, flattened, image, number_of
 from flexmb.export.numbers import Numbers, numbers, with_inputs
 from flexmb.export.refusals import refuse
 from flexmb.jit.pointer import REAL, WHOLE
@@ -26,7 +29,7 @@ from flexmb.tables.workspaces import workspace
 from flexmb.typing import Real
 
 C, W, OUT = range(3)
-"""Numbers of the bundles in the block: constants, workspace, outputs."""
+"""Numbers of the bundles in the block: constants, workspace, outputs; of closed chains the chain, `Ends`, outputs."""
 TOTAL = -1
 """Place of the output that is no word of the block: the sum of the energies."""
 
@@ -53,7 +56,8 @@ class ExportedModel(NamedTuple):
     name: of the scene; identifier: as a name of C; digest: of the scene's text. states: q, u and work, the speeds after
     `coordinates` of them. numbers: inputs and parameters. bodies, connectors: names for messages. fault: word with the
     number of the body that a failure is at. code: object file with functions <identifier>_kernel_rates, _outputs and
-    _settle.
+    _settle. closures: names of what closes a chain, none of a tree; branch: first word and length of the arrays that
+    its motion is remembered in, by name. open_loads: why loads are no outputs, empty if they are.
     """
 
     name: str
@@ -69,6 +73,9 @@ class ExportedModel(NamedTuple):
     bodies: tuple[str, ...]
     connectors: tuple[str, ...]
     fault: int
+    closures: tuple[str, ...]
+    branch: dict[str, tuple[int, int]]
+    open_loads: str
     code: bytes
 
     def outputs_at(self, name: str) -> int:
@@ -92,28 +99,45 @@ def tabled(scene: Scene, inputs: Sequence[str] = ()) -> tuple[ExportedModel, tup
     scene = with_inputs(scene, tuple(inputs))
     system = compile(scene, kernels="special")
     apart = system.with_numbers(system.scene)  # equal functions of time are numbers of their own
-    tables = _tables(apart)
+    at_hand = assembled(system.scene)
+    start = at_hand.initial_state  # by kernels that are at hand
+    counted = None
+    if at_hand.constraints is not None:
+        counted, _ = at_hand.constraints.route("articulated", 0.0).tables()
+    tables = _tables(apart, counted)
     kinds = tuple(each._numba_type_ for each in tables)
     base = image(tables)
-    start = assembled(system.scene).initial_state  # by kernels that are at hand
+    own, work = _tree(tables)
+    speed = number_of(tables, own)
 
     def block(changed: Scene) -> Image | None:
-        other = _tables(system.with_numbers(changed))
+        other = _tables(system.with_numbers(changed), counted)
         same = all(each._numba_type_ == kind for each, kind in zip(other, kinds, strict=True))
-        if not same or any(_shapes(a) != _shapes(b) for a, b in zip(other, tables, strict=True)):
+        if not same or list(map(_shapes, flattened(other))) != list(map(_shapes, flattened(tables))):
             return None
-        return _without_doubt(image(other, base), system)
+        return _without_doubt(image(other, base), own, speed)
 
-    found = numbers(system.scene, _without_doubt(base, system), block)
+    found = numbers(system.scene, _without_doubt(base, own, speed), block)
     identifier = _identifier(scene.name)
     q, u = system.state_names
     names = (*q, *u, ("work", "J"))
     states = tuple(Variable(*each, float(value)) for each, value in zip(names, start.y, strict=True))
     links = tuple(link.name for link in system.links)
+    closed = tables[C] if isinstance(tables[C], Closed) else None
+    open_loads, branch = "", dict[str, tuple[int, int]]()
+    if closed is not None:
+        if int(closed.cw.rank.sum()) < len(closed.cc.row):
+            open_loads = (
+                "loads of hinges and closures, and drives, are no outputs: closures are redundant, and the motion does "
+                "not determine how they share their loads (flexmb.System.determined_loads says which); a joint that "
+                "suppresses fewer motions makes them unique"
+            )
+        branch = _remembered(base, number_of(tables, closed.cw))
     return ExportedModel(
         scene.name, scene.description, identifier, sha256(dumps(scene).encode()).hexdigest(), states, system.nq,
-        found, tuple(_outputs(system, base)), base, timing_of(system), links,
-        tuple(system.observed_names.connectors), base.word(W, "fault"), b"",
+        found, tuple(_outputs(system, tables[OUT], base, not open_loads)), base, timing_of(system), links,
+        tuple(system.observed_names.connectors), base.word(number_of(tables, work), "fault"),
+        tuple(each.name for each in system.scene.constraints), branch, open_loads, b"",
     ), kinds  # fmt: skip
 
 
@@ -122,36 +146,60 @@ def memory(system: System) -> Image:
     return image(_tables(system))
 
 
-def _tables(system: System) -> tuple[Any, Any, Any]:
-    c = system.explicit_constants
-    return c, workspace(c, system.nq, system.nu), system.observation.outputs()
+def _tables(system: System, counted: Closed | None = None) -> tuple[Any, Any, Any]:
+    """The bundles C, W, OUT; counted: a chain of the same closures whose independent rows have been counted."""
+    out = system.observation.outputs()
+    if system.constraints is None:
+        c = system.explicit_constants
+        return c, workspace(c, system.nq, system.nu), out
+    chain = system.constraints.closures.chain("articulated")
+    if counted is not None:
+        chain.cw.rank[:], chain.cw.size[:] = counted.cw.rank, counted.cw.size
+    return chain, entry.Ends(np.zeros((len(chain.cc.closure), 6))), out
+
+
+def _tree(tables: tuple[Any, Any, Any]) -> tuple[Any, Any]:
+    """Constants and workspace of the tree."""
+    chain = tables[C]
+    return (chain.c, chain.w) if isinstance(chain, Closed) else tables[:2]
+
+
+def _remembered(block: Image, number: int) -> dict[str, tuple[int, int]]:
+    return {name: (at // ROW, size // ROW) for (of, name), (at, size) in block.arrays.items() if of == number}
 
 
 def _shapes(bundle: Any) -> list[tuple[int, ...]]:
-    return [getattr(bundle, name).shape for name in bundle.__dataclass_fields__]
+    arrays = (getattr(bundle, name) for name in bundle.__dataclass_fields__)
+    return [array.shape for array in arrays if isinstance(array, np.ndarray)]
 
 
-def _without_doubt(block: Image, system: System) -> Image:
+def _without_doubt(block: Image, constants: Any, number: int) -> Image:
     """The block without the size below which a pivot is doubtful: an exported model does not ask for it."""
-    words, speed = block.words.copy(), system.explicit_constants.speed
+    words, speed = block.words.copy(), constants.speed
     if len(speed):
-        first, place = block.word(C, "speed"), speed["doubtful"].ctypes.data - speed.ctypes.data
+        first, place = block.word(number, "speed"), speed["doubtful"].ctypes.data - speed.ctypes.data
         words[first + place // ROW :: speed.itemsize // ROW][: len(speed)] = 0.0
     return Image(words, block.stored, block.addresses, block.bundles, block.arrays)
 
 
 def _code(identifier: str, kinds: tuple[Any, Any, Any]) -> bytes:
     (c, w, out), state = kinds, (REAL, WHOLE, WHOLE, WHOLE)
+    rates, outputs, settle = entry.rates, entry.outputs, entry.settle
+    if c.of is Closed:
+        rates, outputs, settle = entry.chain_rates, entry.chain_outputs, entry.chain_settle
     return emitted({
-        f"{identifier}_kernel_rates": (entry.rates, (*state, c, w)),
-        f"{identifier}_kernel_outputs": (entry.outputs, (*state, c, w, out)),
-        f"{identifier}_kernel_settle": (entry.settle, (REAL, WHOLE, WHOLE, c)),
+        f"{identifier}_kernel_rates": (rates, (*state, c, w)),
+        f"{identifier}_kernel_outputs": (outputs, (REAL, WHOLE, WHOLE, c, w, out)),
+        f"{identifier}_kernel_settle": (settle, (REAL, WHOLE, WHOLE, c)),
     })  # fmt: skip
 
 
-def _outputs(system: System, block: Image) -> Iterator[Output]:
-    """Everything observable, in the order of a trajectory's columns; rotations are matrices."""
-    names, out = system.observed_names, system.observation.out
+def _outputs(system: System, out: Any, block: Image, loads: bool) -> Iterator[Output]:
+    """Everything observable, in the order of a trajectory's columns; rotations are matrices.
+
+    loads: with those of hinges and closures, and drives.
+    """
+    names = system.observed_names
 
     def place(array: Real) -> int:
         return block.word(OUT, "every") + (array.ctypes.data - out.every.ctypes.data) // ROW
@@ -168,13 +216,15 @@ def _outputs(system: System, block: Image) -> Iterator[Output]:
         yield from columns("velocity", name, first + 12, 6)
         yield from columns("acceleration", name, first + 18, 6)
     spatial: tuple[tuple[Kind, Sequence[str], Real], ...] = (
-        ("loads", names.hinges, out.loads), ("wheel_loads", names.wheels, out.wheel_loads),
+        ("loads", names.hinges if loads else (), out.loads), ("wheel_loads", names.wheels, out.wheel_loads),
         ("connectors", names.connectors, out.connectors),
     )  # fmt: skip
     for kind, whose, rows in spatial:
         for i, name in enumerate(whose):
             yield from columns(kind, name, place(rows[i]), 6)
-    for name, places in names.driven.items():
+    for i, each in enumerate(system.scene.constraints if loads else ()):
+        yield from columns("loads", each.name, block.word(W, "loads") + 6 * i, 6)
+    for name, places in names.driven.items() if loads else ():
         for i, speed in enumerate(places.tolist()):
             unit = {"rad/s": "N m", "m/s": "N"}[system.state_names[1][speed][1]]
             yield Output(f"{name}.drive[{i}]", unit, block.word(OUT, "drives") + speed)

@@ -199,7 +199,7 @@ def _independent(
                     size[word] += abs(slope * move)
             touched = sorted({word for each in kept for word, _ in each.effects})
             same = base.words.view(np.int64) == together.words.view(np.int64)
-            same[touched] = np.abs(expected - together.words)[touched] <= ROUNDING * size[touched]
+            same[touched] = np.abs(expected[touched] - together.words[touched]) <= ROUNDING * size[touched]
             wrong = set(np.flatnonzero(~same).tolist())
             if not wrong:
                 return kept

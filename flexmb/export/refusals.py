@@ -18,13 +18,8 @@ class NotExportable(NotImplementedError):
 
 
 def refuse(scene: Scene) -> None:
-    """NotExportable for a scene that is more than one ordinary differential equation."""
+    """NotExportable for a scene that is more than one differential equation, with the constraints that it keeps."""
     name = f'scene "{scene.name}"'
-    if scene.constraints:
-        raise NotExportable(
-            f'{name} cannot be exported: "{scene.constraints[0].name}" closes a loop or couples coordinates, and only '
-            "trees are exported yet: open the loop and join its ends by a stiff connector, a spring_damper or a bushing"
-        )
     if scene.controllers:
         raise NotExportable(
             f'{name} cannot be exported: controller "{scene.controllers[0].name}" runs beside the equations of motion: '

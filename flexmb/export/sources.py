@@ -20,7 +20,7 @@ def header(model: ExportedModel) -> str:
     sizes = {
         "STATES": len(model.states), "COORDINATES": model.coordinates, "OUTPUTS": len(model.outputs),
         "INPUTS": sum(each.candidate.is_input for each in numbers), "NUMBERS": len(numbers),
-        "BYTES": 8 * len(model.image.words),
+        "BYTES": 8 * len(model.image.words), "REMEMBERED": sum(size for _, size in model.branch.values()),
     }  # fmt: skip
     text = _shared("core.h", model)
     for name, size in sizes.items():
@@ -56,10 +56,10 @@ def _tables(model: ExportedModel) -> Iterable[str]:
     yield _array("uint32_t", "ADDRESSES", (f"{{{word}u, {to}u}}" for word, to in block.addresses.tolist()), "[2]")
     for constant, value in (
         ("CONSTANTS", block.bundles[C]), ("WORKSPACE", block.bundles[W]), ("OUTPUTS", block.bundles[OUT]),
-        ("ENERGY", model.outputs_at("energy.kinetic")), ("FAULT", model.fault), ("BODIES", len(model.bodies)),
-        ("CONNECTORS", len(model.connectors)), ("OVERTURNED", int(Status.CONNECTOR_OVERTURNED)),
-        ("SWITCHES", len(model.timing.switches)), ("FROM", _real(model.timing.start)),
-        ("UNTIL", _real(model.timing.end)),
+        ("ENERGY", model.outputs_at("energy.kinetic")), ("FAULT", model.fault),
+        ("BEFORE", model.branch["time"][0] if model.branch else 0), ("SWITCHES", len(model.timing.switches)),
+        ("SINGULAR", int(Status.CLOSURE_SINGULAR)), ("BRANCH", int(Status.BRANCH_UNKNOWN)),
+        ("FROM", _real(model.timing.start)), ("UNTIL", _real(model.timing.end)),
     ):  # fmt: skip
         yield f"#define {constant} {value}"
     yield _array("double", "SWITCH", map(_real, model.timing.switches or (inf,)))
@@ -83,13 +83,18 @@ def _tables(model: ExportedModel) -> Iterable[str]:
     yield _array("double", "SLOPE", [_real(slope) for effects in of_word for _, slope in effects] or ["0.0"])
     yield _array("int", "TOUCHES", map(str, _starts([len(each.effects) for each in numbers])))
     yield _array("int", "TOUCHED", [str(at[effect.word]) for each in numbers for effect in each.effects] or ["0"])
+    ranges = (f"{{{first}u, {size}u}}" for first, size in model.branch.values() or ((0, 0),))
+    yield _array("uint32_t", "KEPT", ranges, "[2]")
+    named = {"BODY_NAMES": model.bodies, "CONNECTOR_NAMES": model.connectors, "CLOSURE_NAMES": model.closures}
+    for array, those in named.items():
+        yield _array("char *const", array, map(_text, those or ("",)))
     advice = (
-        "{" + f"{status}, {_text(text.replace('%', '%%').replace('{body}', _QUOTED))}" + "}"
+        f"{{{status}, {_at_fault(status)}, {len(named[_at_fault(status)])}, "
+        f"{_text(text.replace('%', '%%').replace('{body}', _QUOTED))}}}"
         for status, text in ADVICE.items()
     )
-    yield "static const struct { int status; const char *text; } ADVICE[] = {" + ",\n".join(advice) + "};"
-    yield _array("char *const", "BODY_NAMES", map(_text, model.bodies))
-    yield _array("char *const", "CONNECTOR_NAMES", map(_text, model.connectors or ("",)))
+    fields = "int status; const char *const *names; int count; const char *text;"
+    yield f"static const struct {{ {fields} }} ADVICE[] = {{" + ",\n".join(advice) + "};"
     changeable = [each.candidate.name for each in numbers]
     for what, names in (
         ("state", [each.name for each in model.states]), ("number", changeable or [""]),
@@ -101,6 +106,16 @@ def _tables(model: ExportedModel) -> Iterable[str]:
 
 
 _QUOTED = '"%s"'
+
+
+def _at_fault(status: int) -> str:
+    """The array with the names of what a failure may be at."""
+    match status:
+        case Status.CONNECTOR_OVERTURNED:
+            return "CONNECTOR_NAMES"
+        case Status.CLOSURE_SINGULAR | Status.CLOSURE_OPEN | Status.BRANCH_UNKNOWN:
+            return "CLOSURE_NAMES"
+    return "BODY_NAMES"
 
 
 def _starts(counts: Sequence[int]) -> list[int]:

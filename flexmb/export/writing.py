@@ -34,9 +34,10 @@ def export_fmu(scene: Scene, path: Path, *, inputs: Sequence[str] = (), step: fl
     inputs, too. step (s): the archive is for Co-Simulation, too, by the classical Runge-Kutta method in equal steps of
     at most this size. Takes some 15 s of compiling for a kind of scene.
 
-    Raises NotExportable, before anything is compiled, for closed chains, controllers and events, another platform, and
-    where no C compiler is found; SceneError for a scene that is wrong, PathError for an input that is not there,
-    ValueError for a step that is not positive, OSError where the file cannot be written.
+    Raises NotExportable, before anything is compiled, for controllers and events, another platform, and where no C
+    compiler is found; ClosureError for loops that cannot be closed or allow no motion; SceneError for a scene that is
+    wrong, PathError for an input that is not there, ValueError for a step that is not positive, OSError where the file
+    cannot be written.
     """
     _check_step(step)
     c_compiler()
@@ -116,5 +117,6 @@ def _page(model: ExportedModel) -> str:
         f"<h1>{escape(model.name)}</h1><p>{escape(model.description)}</p>"
         "<p>Names, units and start values are in modelDescription.xml. Numbers of the scene that are neither "
         "parameters there nor in this table are fixed: modal quantities or directions are computed from them.</p>"
+        f"<p>{escape(model.open_loads)}</p>"
         f"<table><tr><th>fixed</th><th>why</th></tr>{fixed}</table></html>\n"
     )

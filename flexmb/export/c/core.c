@@ -1,7 +1,7 @@
 /* The functions of MODEL.h around the compiled equations; the tables of the scene stand before this text. */
 
 extern int32_t MODEL_kernel_rates(int64_t *, void **, double, int64_t, int64_t, int64_t, void *, void *);
-extern int32_t MODEL_kernel_outputs(int64_t *, void **, double, int64_t, int64_t, int64_t, void *, void *, void *);
+extern int32_t MODEL_kernel_outputs(int64_t *, void **, double, int64_t, int64_t, void *, void *, void *);
 extern int32_t MODEL_kernel_settle(int64_t *, void **, double, int64_t, int64_t, void *);
 
 static unsigned char *memory_of(MODEL_instance *m) {
@@ -20,21 +20,44 @@ void MODEL_init(MODEL_instance *m) {
     m->last = INFINITY;
 }
 
-void MODEL_settle(MODEL_instance *m, double t, double *y) {
+int MODEL_settle(MODEL_instance *m, double t, double *y) {
     int64_t result = 0;
     void *error = NULL;
-    MODEL_kernel_settle(&result, &error, t, (int64_t)(uintptr_t)y, MODEL_STATES, memory_of(m) + CONSTANTS);
+    if (MODEL_kernel_settle(&result, &error, t, (int64_t)(uintptr_t)y, MODEL_STATES, memory_of(m) + CONSTANTS))
+        return -1;
+    return (int)result;
 }
 
-void MODEL_start(MODEL_instance *m, double t, double *y) {
+/* The state before, by which the closures know on which branch they are, is none. */
+static void forget(MODEL_instance *m) {
+    if (MODEL_REMEMBERED) ((double *)memory_of(m))[BEFORE] = -INFINITY;
+}
+
+int MODEL_begin(MODEL_instance *m, double t, double *y) {
+    forget(m);
+    return MODEL_settle(m, t, y);
+}
+
+int MODEL_start(MODEL_instance *m, double t, double *y) {
     memcpy(y, MODEL_state_start, MODEL_STATES * sizeof(double));
-    MODEL_settle(m, t, y);
+    return MODEL_begin(m, t, y);
+}
+
+void MODEL_remember(MODEL_instance *m, double *numbers) {
+    for (size_t i = 0; i < sizeof KEPT / sizeof *KEPT; numbers += KEPT[i++][1])
+        memcpy(numbers, memory_of(m) + 8 * (size_t)KEPT[i][0], 8 * (size_t)KEPT[i][1]);
+}
+
+void MODEL_recall(MODEL_instance *m, const double *numbers) {
+    for (size_t i = 0; i < sizeof KEPT / sizeof *KEPT; numbers += KEPT[i++][1])
+        memcpy(memory_of(m) + 8 * (size_t)KEPT[i][0], numbers, 8 * (size_t)KEPT[i][1]);
 }
 
 void MODEL_set(MODEL_instance *m, int number, double value) {
     double *words = (double *)memory_of(m);
     if (m->number[number] == value) return;
     m->number[number] = value;
+    if (number >= MODEL_INPUTS) forget(m); /* other masses turn the rows of closures */
     for (int i = TOUCHES[number]; i < TOUCHES[number + 1]; i++) {
         const int word = TOUCHED[i];
         double sum = REST[word];
@@ -64,9 +87,11 @@ int MODEL_outputs(MODEL_instance *m, double t, const double *y, double *dy, doub
     const double *words = (const double *)memory;
     int64_t result = 0;
     void *error = NULL;
-    if (!defined(m, &t)) return MODEL_OUT_OF_TIME;
-    if (MODEL_kernel_outputs(&result, &error, t, (int64_t)(uintptr_t)y, (int64_t)(uintptr_t)dy, MODEL_STATES,
-                             memory + CONSTANTS, memory + WORKSPACE, memory + OUTPUTS))
+    const int status = MODEL_rhs(m, t, y, dy);
+    if (status) return status;
+    defined(m, &t);
+    if (MODEL_kernel_outputs(&result, &error, t, (int64_t)(uintptr_t)y, MODEL_STATES, memory + CONSTANTS,
+                             memory + WORKSPACE, memory + OUTPUTS))
         return -1;
     if (result) return (int)result;
     for (int i = 0; i < MODEL_OUTPUTS; i++) {
@@ -118,8 +143,10 @@ int MODEL_run(MODEL_instance *m, double t, double t_end, double step, double *y,
         for (double j = 0.0; j < steps; j += 1.0) {
             int status = step_of(m, t, y, h);
             if (status) return status;
-            t = j == steps - 1.0 ? end : start + (j + 1.0) * h;
-            MODEL_settle(m, t, m->stage[5]);
+            const double reaches = j == steps - 1.0 ? end : start + (j + 1.0) * h;
+            status = MODEL_settle(m, reaches, m->stage[5]);
+            if (status) return status;
+            t = reaches;
             memcpy(y, m->stage[5], MODEL_STATES * sizeof(double));
             *reached = t;
         }
@@ -137,9 +164,8 @@ void MODEL_message(MODEL_instance *m, int status, char *text, size_t size) {
     }
     for (size_t i = 0; i < sizeof ADVICE / sizeof *ADVICE; i++)
         if (ADVICE[i].status == status) {
-            const char *const *names = status == OVERTURNED ? CONNECTOR_NAMES : BODY_NAMES;
-            const int count = status == OVERTURNED ? CONNECTORS : BODIES;
-            snprintf(text, size, ADVICE[i].text, fault >= 0 && fault < count ? names[fault] : "?");
+            const int known = fault >= 0 && fault < ADVICE[i].count;
+            snprintf(text, size, ADVICE[i].text, known ? ADVICE[i].names[fault] : "?");
             return;
         }
     snprintf(text, size, status ? "the evaluation failed with status %d" : "done", status);

@@ -22,6 +22,7 @@ extern "C" {
 #define MODEL_NUMBERS @NUMBERS@
 #define MODEL_OUTPUTS @OUTPUTS@
 #define MODEL_BYTES @BYTES@
+#define MODEL_REMEMBERED @REMEMBERED@ /* numbers of MODEL_remember, 0 unless the model has closed loops */
 
 #define MODEL_OUT_OF_TIME (-2) /* a table of the scene does not reach there */
 
@@ -40,16 +41,22 @@ extern const double MODEL_number_start[];
 
 /* Give an instance the numbers of the scene. */
 void MODEL_init(MODEL_instance *m);
-/* The scene's start at time t: its values, with prescribed motions as they are then. */
-void MODEL_start(MODEL_instance *m, double t, double *y);
+/* The scene's start at time t: its values, with prescribed motions as they are then and loops closed. */
+int MODEL_start(MODEL_instance *m, double t, double *y);
+/* The same for a start y of one's own, which receives the nearest one that is possible. Call one of both first. */
+int MODEL_begin(MODEL_instance *m, double t, double *y);
 /* Change an input or a parameter. */
 void MODEL_set(MODEL_instance *m, int number, double value);
 /* dy/dt at time t (s). */
 int MODEL_rhs(MODEL_instance *m, double t, const double *y, double *dy);
 /* The same, and all outputs. */
 int MODEL_outputs(MODEL_instance *m, double t, const double *y, double *dy, double *out);
-/* Quaternions get unit length, prescribed motions their values. */
-void MODEL_settle(MODEL_instance *m, double t, double *y);
+/* Quaternions get unit length, prescribed motions their values, loops are closed. Of a model with loops call it after
+ * each step: it also chooses the rows of the closures for the next one, and steps that turn these too far fail. */
+int MODEL_settle(MODEL_instance *m, double t, double *y);
+/* What an instance knows of the last step, to go back to it: numbers that a copy of the state needs beside y. */
+void MODEL_remember(MODEL_instance *m, double *numbers);
+void MODEL_recall(MODEL_instance *m, const double *numbers);
 /* The first time after t at which a function of time jumps or is not smooth; infinity if there is none. */
 double MODEL_next_switch(double t);
 /* Functions of time have their limits from the left at the next switch after t, until this is called again. */

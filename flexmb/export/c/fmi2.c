@@ -29,8 +29,8 @@ enum { STALE, RATES_KNOWN, ALL_KNOWN };
 /* What is saved and restored; numbers only. */
 typedef struct {
     uint64_t guid;
-    int phase, started;
-    double t, last, step, y[N], number[MODEL_NUMBERS + 1];
+    int phase, started, set, drifted;
+    double t, last, step, tolerance, y[N], number[MODEL_NUMBERS + 1], remembered[MODEL_REMEMBERED + 1];
 } Values;
 
 typedef struct {
@@ -72,6 +72,7 @@ static void begin(Instance *c) {
     memcpy(c->v.y, MODEL_state_start, sizeof c->v.y);
     memcpy(c->v.number, MODEL_number_start, MODEL_NUMBERS * sizeof(double));
     c->v.step = STEP;
+    c->v.tolerance = 1e-8; /* as modelDescription.xml says */
     c->v.last = INFINITY;
     c->v.phase = INSTANTIATED;
     c->known = STALE;
@@ -120,8 +121,9 @@ API fmi2Status fmi2SetDebugLogging(void *component, fmi2Boolean on, size_t count
 
 API fmi2Status fmi2SetupExperiment(void *component, fmi2Boolean has_tolerance, double tolerance, double start,
                                    fmi2Boolean has_stop, double stop) {
-    (void)has_tolerance, (void)tolerance, (void)has_stop, (void)stop;
+    (void)has_stop, (void)stop;
     IN(INSTANTIATED);
+    if (has_tolerance && tolerance > 0.0) c->v.tolerance = tolerance;
     c->v.t = start;
     return fmi2OK;
 }
@@ -132,18 +134,20 @@ API fmi2Status fmi2EnterInitializationMode(void *component) {
     return fmi2OK;
 }
 
-/* Prescribed motions have their values, quaternions unit length, from the start on. */
-static void settle(Instance *c) {
+/* Prescribed motions have their values, quaternions unit length, and loops are closed, from the start on. */
+static fmi2Status settle(Instance *c) {
     MODEL_segment(&c->model, c->v.t);
     c->v.last = c->model.last;
-    MODEL_settle(&c->model, c->v.t, c->v.y);
+    const int status = MODEL_begin(&c->model, c->v.t, c->v.y);
     c->known = STALE;
+    return status ? failed(c, status) : fmi2OK;
 }
 
 API fmi2Status fmi2ExitInitializationMode(void *component) {
     IN(INITIALISING);
-    settle(c);
+    if (settle(c) != fmi2OK) return fmi2Error;
     c->v.started = 1;
+    c->v.set = 0;
     c->v.phase = c->is_cs ? STEPPING : EVENTS;
     return fmi2OK;
 }
@@ -160,11 +164,17 @@ API fmi2Status fmi2Reset(void *component) {
     return fmi2OK;
 }
 
+/* Failures of states too far from the last step's, which a shorter one does not reach. */
+static int shorter(int status) { return MODEL_REMEMBERED && (status == SINGULAR || status == BRANCH); }
+
 static fmi2Status know(Instance *c, int what) {
     if (c->known >= what) return fmi2OK;
     int status = what == ALL_KNOWN ? MODEL_outputs(&c->model, c->v.t, c->v.y, c->dy, c->out)
                                    : MODEL_rhs(&c->model, c->v.t, c->v.y, c->dy);
-    if (status) return failed(c, status);
+    if (status) {
+        failed(c, status);
+        return shorter(status) && c->v.phase == CONTINUOUS ? fmi2Discard : fmi2Error;
+    }
     c->known = what;
     return fmi2OK;
 }
@@ -175,18 +185,20 @@ API fmi2Status fmi2GetReal(void *component, const fmi2ValueReference vr[], size_
         const unsigned int r = vr[i];
         if (c->v.phase == INITIALISING && (r < NUMBER || (r >= OUTPUT && r < STEP_SIZE))) {
             const int known = c->known;
-            settle(c);
+            if (settle(c) != fmi2OK) return fmi2Error;
             c->known = known;
         }
         if (r < RATE)
             value[i] = c->v.y[r];
         else if (r < NUMBER) {
-            if (know(c, RATES_KNOWN) != fmi2OK) return fmi2Error;
+            const fmi2Status status = know(c, RATES_KNOWN);
+            if (status != fmi2OK) return status;
             value[i] = c->dy[r - RATE];
         } else if (r < OUTPUT)
             value[i] = c->v.number[r - NUMBER];
         else if (r < STEP_SIZE) {
-            if (know(c, ALL_KNOWN) != fmi2OK) return fmi2Error;
+            const fmi2Status status = know(c, ALL_KNOWN);
+            if (status != fmi2OK) return status;
             value[i] = c->out[r - OUTPUT];
         } else if (r == STEP_SIZE && STEP > 0.0)
             value[i] = c->v.step;
@@ -204,6 +216,7 @@ API fmi2Status fmi2SetReal(void *component, const fmi2ValueReference vr[], size_
         if (r < RATE) {
             if (c->v.started && !c->is_cs) return fail(c, "states are set by fmi2SetContinuousStates after the start");
             c->v.y[r] = value[i];
+            c->v.set = 1;
         } else if (r >= NUMBER && r < OUTPUT) {
             c->v.number[r - NUMBER] = value[i];
             MODEL_set(&c->model, (int)(r - NUMBER), value[i]);
@@ -232,6 +245,7 @@ API fmi2Status fmi2SetString(void *k, const fmi2ValueReference *r, size_t n, con
 static void restore(Instance *c, const Values *v) {
     c->v = *v;
     for (int i = 0; i < MODEL_NUMBERS; i++) MODEL_set(&c->model, i, v->number[i]);
+    MODEL_recall(&c->model, v->remembered);
     c->model.last = v->last;
     c->known = STALE;
 }
@@ -240,6 +254,7 @@ API fmi2Status fmi2GetFMUstate(void *component, void **state) {
     IN(~0);
     if (!*state) *state = c->call.allocateMemory(1, sizeof(Values));
     if (!*state) return fail(c, "there is no memory for the state");
+    MODEL_remember(&c->model, c->v.remembered);
     memcpy(*state, &c->v, sizeof(Values));
     return fmi2OK;
 }
@@ -305,6 +320,12 @@ API fmi2Status fmi2NewDiscreteStates(void *component, fmi2EventInfo *info) {
     c->v.last = c->model.last;
     c->known = STALE;
     memset(info, 0, sizeof *info);
+    if (c->v.drifted) {
+        const int status = MODEL_settle(&c->model, c->v.t, c->v.y);
+        if (status) return failed(c, status);
+        c->v.drifted = 0;
+        info->valuesOfContinuousStatesChanged = 1;
+    }
     info->nextEventTimeDefined = !isinf(next);
     info->nextEventTime = isinf(next) ? 0.0 : next;
     return fmi2OK;
@@ -320,6 +341,14 @@ API fmi2Status fmi2CompletedIntegratorStep(void *component, fmi2Boolean keeps, f
     (void)keeps;
     IN(CONTINUOUS);
     *events = *ends = 0;
+    if (!MODEL_REMEMBERED) return fmi2OK;
+    double closed[N];
+    memcpy(closed, c->v.y, sizeof closed);
+    const int status = MODEL_settle(&c->model, c->v.t, closed);
+    if (status) return failed(c, status);
+    for (int i = 0; i < N; i++)
+        if (fabs(closed[i] - c->v.y[i]) > c->v.tolerance * fmax(1.0, fabs(closed[i]))) c->v.drifted = *events = 1;
+    c->known = STALE;
     return fmi2OK;
 }
 
@@ -341,7 +370,8 @@ API fmi2Status fmi2SetContinuousStates(void *component, const double y[], size_t
 API fmi2Status fmi2GetDerivatives(void *component, double dy[], size_t count) {
     IN(INITIALISING | EVENTS | CONTINUOUS);
     if (count != N) return fail(c, "the number of states is another one");
-    if (know(c, RATES_KNOWN) != fmi2OK) return fmi2Error;
+    const fmi2Status status = know(c, RATES_KNOWN);
+    if (status != fmi2OK) return status;
     memcpy(dy, c->dy, sizeof c->dy);
     return fmi2OK;
 }
@@ -373,7 +403,9 @@ API fmi2Status fmi2DoStep(void *component, double t, double size, fmi2Boolean ke
     IN(STEPPING);
     if (!(size > 0.0)) return fail(c, "a communication step is positive");
     c->v.t = t;
-    int status = MODEL_run(&c->model, t, t + size, c->v.step, c->v.y, &c->v.t);
+    int status = c->v.set && MODEL_REMEMBERED ? MODEL_begin(&c->model, t, c->v.y) : 0;
+    c->v.set = 0;
+    if (!status) status = MODEL_run(&c->model, t, t + size, c->v.step, c->v.y, &c->v.t);
     c->v.last = c->model.last;
     c->reached = c->v.t;
     c->known = STALE;

@@ -11,7 +11,7 @@ int main(int count, char **words) {
     const double step = count > 2 ? atof(words[2]) : 1e-4;
     char text[400];
     MODEL_init(m);
-    MODEL_start(m, 0.0, y);
+    int status = MODEL_start(m, 0.0, y);
     if (count > 3 && !strcmp(words[3], "time")) {
         struct timespec a, b;
         clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &a);
@@ -23,7 +23,7 @@ int main(int count, char **words) {
         printf("%.1f ns\n", ((double)(b.tv_sec - a.tv_sec) * 1e9 + (double)(b.tv_nsec - a.tv_nsec)) / 20000.0);
         return 0;
     }
-    int status = MODEL_run(m, 0.0, end, step, y, &t);
+    if (!status) status = MODEL_run(m, 0.0, end, step, y, &t);
     if (!status) status = MODEL_outputs(m, t, y, dy, out);
     if (status) {
         MODEL_message(m, status, text, sizeof text);

@@ -297,12 +297,6 @@ def test_c_compiles_without_a_warning_and_runs_as_the_scene(
     assert b"malloc" in (tmp_path / "example").read_bytes()  # the example's own, which is seen
 
 
-def closed() -> fm.Scene:
-    from tests.flexmb.closure import mechanisms
-
-    return mechanisms.four_bar(modes=0)
-
-
 def controlled() -> fm.Scene:
     scene = fm.SceneBuilder("steered").rigid_body("arm", mass=1.0, inertia=(0.1, 0.1, 0.1))
     scene.revolute("pivot", "ground", "arm", torque=fm.ControlSignal(source="law"))
@@ -319,7 +313,7 @@ def stopped() -> fm.Scene:
 
 @pytest.mark.parametrize(
     "made, words",
-    [(closed, "open the loop and join its ends"), (controlled, "--input HINGE"), (stopped, "take the events out")],
+    [(controlled, "--input HINGE"), (stopped, "take the events out")],
 )
 def test_what_is_not_exported_is_refused_with_the_remedy(made: Any, words: str, monkeypatch: Any) -> None:
     monkeypatch.setattr("flexmb.export.model._code", lambda *_: pytest.fail("compiled"))
