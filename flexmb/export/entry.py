@@ -19,7 +19,7 @@ from flexmb.typing import Real
 
 
 @bundle
-class Ends:
+class EndLoads:
     """What closures exert."""
 
     loads: Real  # (C,6) [torque; force] on body_b about frame B, World axes

@@ -29,7 +29,7 @@ from flexmb.tables.workspaces import workspace
 from flexmb.typing import Real
 
 C, W, OUT = range(3)
-"""Numbers of the bundles in the block: constants, workspace, outputs; of closed chains the chain, `Ends`, outputs."""
+"""Numbers of the bundles in the block: constants, workspace, outputs; of chains the chain, `EndLoads`, outputs."""
 TOTAL = -1
 """Place of the output that is no word of the block: the sum of the energies."""
 
@@ -155,7 +155,7 @@ def _tables(system: System, counted: Closed | None = None) -> tuple[Any, Any, An
     chain = system.constraints.closures.chain("articulated")
     if counted is not None:
         chain.cw.rank[:], chain.cw.size[:] = counted.cw.rank, counted.cw.size
-    return chain, entry.Ends(np.zeros((len(chain.cc.closure), 6))), out
+    return chain, entry.EndLoads(np.zeros((len(chain.cc.closure), 6))), out
 
 
 def _tree(tables: tuple[Any, Any, Any]) -> tuple[Any, Any]:
