@@ -216,6 +216,7 @@ SWEEPS = (_SWEEP, _SWEEP.replace("seed", 'sampling = "latin_hypercube"\nseed'))
 SCENE = str(CASES / "pendulums" / "double" / "scene.toml")
 WORDS = {
     "simulate": (SCENE, "--t-end", "0.01", "--out", "out"), "check": (SCENE,), "equivalence": ("panel.toml", "panel"),
+    "view": (SCENE, "--out", "view.html"),
     "advise": (SCENE,), "linearize": (SCENE,), "vibrate": (SCENE,), "campbell": (SCENE, "shoulder", "--rates", "0:1:2"),
     "reduce": ("K.mtx", "M.mtx", "nodes.csv", "--interface", "1", "--out", "x.sid"), "stability": ("no map",),
     "sweep": ("none.toml",), "contract": ("nobody",),

@@ -24,6 +24,7 @@ from tests.repo.project import ROOT
 LARGE = "1000000000000000"
 TAKEN = {
     f"flexmb simulate t_end {LARGE}", f"flexmb advise t_end {LARGE}",  # max_steps bounds the run
+    f"flexmb view t_end {LARGE}",
     f"flexmb simulate atol {LARGE}", "flexmb simulate from_time -1", f"flexmb check t_end {LARGE}",
     f"flexmb campbell modes {LARGE}",  # of those that there are
     f"flexmb equivalence angle {LARGE}", "flexmb equivalence angle -1",

@@ -23,8 +23,16 @@ from crosscheck.judging.uncertainty import (
 )
 from crosscheck.judging.verdict import Ending, Signal
 from crosscheck.library.channels import is_judged, known_to
-from crosscheck.records.drawing import FILM
-from crosscheck.records.kinds import BrokenLine, CaseRecord, ChartRecord, Environment, Record, RunRecord, RunStatus
+from crosscheck.records.kinds import (
+    FILM,
+    BrokenLine,
+    CaseRecord,
+    ChartRecord,
+    Environment,
+    Record,
+    RunRecord,
+    RunStatus,
+)
 from crosscheck.records.packing import Packed, unpack
 from flexmb.kept import kept
 from flexmb.run.channels import signal_range

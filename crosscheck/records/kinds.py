@@ -14,8 +14,10 @@ from crosscheck.library.accepted import Accepted
 from crosscheck.library.case import Provenance, RunFile
 from crosscheck.library.claims import Claims
 from crosscheck.library.work import StoredWork
-from crosscheck.records.drawing import Drawing
 from crosscheck.records.packing import Packed
+from flexmb.view.drawing import Drawing
+
+FILM = "film"  # the role of a run that is made for the animation
 
 
 class ReferenceGoals(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

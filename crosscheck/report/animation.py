@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from crosscheck.judging.results import CaseResults, Result
-from crosscheck.records.drawing import FILM, Drawing, DrawnWheel, Line
-from crosscheck.report.store import Store
+from crosscheck.records.kinds import FILM
 from flexmb.typing import Real
+from flexmb.view.drawing import Drawing, DrawnWheel, carried_line, carried_wheel, carriers
+from flexmb.view.store import Store
 
 
 def animations(store: Store, case: CaseResults) -> list[dict[str, Any]]:
@@ -27,7 +28,7 @@ def animations(store: Store, case: CaseResults) -> list[dict[str, Any]]:
 
 
 def _animation(store: Store, result: Result, drawing: Drawing) -> dict[str, Any]:
-    names = _carriers(drawing)
+    names = carriers(drawing)
     number = {name: i for i, name in enumerate(names)}
     return {
         "title": f"{result.variant}, by {result.engine}",
@@ -35,33 +36,17 @@ def _animation(store: Store, result: Result, drawing: Drawing) -> dict[str, Any]
         "markers": [
             {
                 "name": name,
-                "position": store.signal(result, f"marker:{name}.position"),
-                "orientation": store.signal(result, f"marker:{name}.orientation"),
+                "position": store.samples(result.values(f"marker:{name}.position")),
+                "orientation": store.samples(result.values(f"marker:{name}.orientation")),
             }
             for name in names
         ],
-        "lines": [_line(line, number) for line in drawing.lines],
-        "wheels": [_wheel(store, result, wheel, number) for wheel in drawing.wheels],
+        "lines": [carried_line(line, number) for line in drawing.lines],
+        "wheels": [
+            carried_wheel(wheel, number, store.samples(wheel_angle(result, wheel))) for wheel in drawing.wheels
+        ],
         "trails": [number[name] for name in drawing.trails if name in number],
         "gravity": drawing.gravity,
-    }
-
-
-def _line(line: Line, number: dict[str, int]) -> dict[str, Any]:
-    """A line with its points as [marker number or -1 for the World, offset, tangent]."""
-    points = [[number.get(point.marker, -1), *point.offset, *point.tangent] for point in line.points]
-    return {"body": line.body, "kind": line.kind, "points": points}
-
-
-def _wheel(store: Store, result: Result, wheel: DrawnWheel, number: dict[str, int]) -> dict[str, Any]:
-    return {
-        "name": wheel.name,
-        "marker": number[wheel.marker],
-        "centre": wheel.centre,
-        "axis": wheel.axis,
-        "radius": wheel.radius_m,
-        "width": wheel.width_m,
-        "angle": store.samples(wheel_angle(result, wheel)),
     }
 
 
@@ -95,16 +80,10 @@ def _turned(quaternions: Real, vector: Real) -> Real:
     return vector + w * across + np.cross(u, across)
 
 
-def _carriers(drawing: Drawing) -> list[str]:
-    """Markers that carry something or leave a trail, each once."""
-    carrying = [point.marker for line in drawing.lines for point in line.points if point.marker]
-    return list(dict.fromkeys((*carrying, *(wheel.marker for wheel in drawing.wheels), *drawing.trails)))
-
-
 def _drawable(result: Result, drawing: Drawing) -> bool:
     """Whether the result's last run stored all markers needed; a diverged run is drawn up to its end."""
     if not result.runs or result.finest.times is None:
         return False
     stored = result.finest.channels
-    wanted = (f"marker:{name}.{part}" for name in _carriers(drawing) for part in ("position", "orientation"))
+    wanted = (f"marker:{name}.{part}" for name in carriers(drawing) for part in ("position", "orientation"))
     return all(name in stored for name in wanted)

@@ -18,11 +18,11 @@ from crosscheck.judging.results import CaseResults, Result
 from crosscheck.judging.verdict import Verdict
 from crosscheck.library.channels import CONSERVED, KINDS
 from crosscheck.report.animation import animations
-from crosscheck.report.store import Store
 from crosscheck.report.workprecision import WorkPrecision, work_precision
 from flexmb.output.printable import printable
 from flexmb.run.channels import distance, family, magnitude, matches, norms, signal_range, unit
 from flexmb.typing import Real
+from flexmb.view.store import Store
 
 COMPONENTS = {1: [""], 2: ["1", "2"], 3: ["x", "y", "z"], 4: ["w", "x", "y", "z"]}
 RUNAWAY = 20.0  # ratio of two signals beyond which the larger one does not determine the scale

@@ -8,19 +8,19 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-import msgspec
-from jinja2 import Environment, PackageLoader, select_autoescape
+from jinja2 import ChoiceLoader, Environment, PackageLoader, select_autoescape
 from markupsafe import Markup, escape
 
 from crosscheck.judging.work import seconds
 from flexmb.output.printable import printable
+from flexmb.view.page import in_script
 
 
 @cache
 def templates() -> Environment:
     """The templates; their output is escaped and has no control characters."""
     environment = Environment(
-        loader=PackageLoader("crosscheck.report"),
+        loader=ChoiceLoader([PackageLoader("crosscheck.report"), PackageLoader("flexmb.view", "page")]),
         autoescape=select_autoescape(["html.j2"], default_for_string=True, default=True),
         trim_blocks=True,
         lstrip_blocks=True,
@@ -40,12 +40,14 @@ def source(name: str) -> Markup:
     return Markup(loader.get_source(templates(), name)[0])
 
 
+def style() -> Markup:
+    """The style sheet of the report, with that of animations."""
+    return source("scene.css") + source("style.css")
+
+
 def embedded(data: Any) -> Markup:
     """Data as JSON for a script element, without sequences that would end the element or a line."""
-    text = msgspec.json.encode(data).decode()
-    for character in "<>&\u2028\u2029":
-        text = text.replace(character, f"\\u{ord(character):04x}")
-    return Markup(text)
+    return Markup(in_script(data))
 
 
 def code(text: str) -> Markup:

@@ -13,7 +13,7 @@ from crosscheck.validation.budget import Budget, document
 from flexmb.output.files import write_whole
 
 RESULTS = "validation.json"
-SCRIPTS = ("data.js", "charts.js", "page.js", "measured.js")
+SCRIPTS = ("unpack.js", "data.js", "charts.js", "page.js", "measured.js")
 LIBRARIES = ("plotly/plotly-basic.min.js",)
 NO_SERIES = {"shapes": [], "data": ""}  # the readings are few, and are not packed
 

@@ -21,19 +21,20 @@ from crosscheck.judging.verdict import STATUSES
 from crosscheck.label.document import LabelFile
 from crosscheck.report.case_view import CaseView, case_view
 from crosscheck.report.charts import payload
-from crosscheck.report.html import INDEX, CasePlace, embedded, places, source, templates
+from crosscheck.report.html import INDEX, CasePlace, embedded, places, source, style, templates
 from crosscheck.report.maps import Maps
 from crosscheck.report.mutations import Scores
 from crosscheck.report.overview import findings, matrix
 from crosscheck.report.speed import LEVELS, speed_view
 from flexmb.output.files import folder, write_whole
+from flexmb.view.page import THREE, asset
 
 FOLDER = "report"
 SINGLE = "report.html"
 ASSETS = "assets"
 LISTING = f"{ASSETS}/pages.json"  # the files of the report, which the next report removes
-SCRIPTS = ("data.js", "charts.js", "scene.js", "page.js", "index.js", "speed.js")
-LIBRARIES = ("plotly/plotly-basic.min.js", "three/three.iife.min.js")  # of the folder vendor, loaded when first needed
+SCRIPTS = ("unpack.js", "data.js", "charts.js", "scene.js", "page.js", "index.js", "speed.js")
+LIBRARIES = ("plotly/plotly-basic.min.js", THREE)  # loaded when first needed
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,7 @@ def write_single(material: Material, out: Path) -> Path:
         root="",
         inline=True,
         cases=[_view(case, material, where[case.case.case]) for case in cases],
-        style=source("style.css"),
+        style=style(),
         scripts=[*(Markup(_library(name)) for name in LIBRARIES), *map(source, SCRIPTS)],
         data=[Markup(_registration(case, material, where[case.case.case])) for case in cases],
     )
@@ -93,7 +94,7 @@ def write_unfinished(outcome: SessionOutcome, out: Path) -> None:
 
 def asset_files(scripts: Iterable[str], libraries: Iterable[str]) -> dict[str, str]:
     """The style sheet, scripts and libraries of a folder of pages, by their names in it."""
-    written = {f"{ASSETS}/{name}": str(source(name)) for name in ("style.css", *scripts)}
+    written = {f"{ASSETS}/style.css": str(style())} | {f"{ASSETS}/{name}": str(source(name)) for name in scripts}
     return written | {f"{ASSETS}/{Path(name).name}": _library(name) for name in libraries}
 
 
@@ -145,6 +146,8 @@ def _registration(case: CaseResults, material: Material, place: CasePlace) -> st
 
 
 def _library(name: str) -> str:
+    if name == THREE:
+        return asset(name)
     return files("crosscheck.report").joinpath("vendor", name).read_text(encoding="utf-8")
 
 

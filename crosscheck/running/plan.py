@@ -11,9 +11,6 @@ from typing import assert_never
 import msgspec
 import numpy as np
 
-from crosscheck.drawing.draw import draw
-from crosscheck.drawing.film import EFFORT as FILM_EFFORT
-from crosscheck.drawing.film import ENGINE, FRAMES, film, film_channels
 from crosscheck.engines.contract import Effort, LinearPart
 from crosscheck.engines.linear.coordinates import coordinate_names, is_counted
 from crosscheck.engines.registry import OWN_CODE, home
@@ -23,8 +20,7 @@ from crosscheck.library.find import Case
 from crosscheck.library.mutations import mutate
 from crosscheck.library.reference import current_reference, has_reference, scene_digest
 from crosscheck.library.selection import alone, goals_for_reference, joining, select
-from crosscheck.records.drawing import FILM, Drawing
-from crosscheck.records.kinds import ENVELOPE, CaseRecord, RecordedReference, ReferenceGoals, VariantInfo
+from crosscheck.records.kinds import ENVELOPE, FILM, CaseRecord, RecordedReference, ReferenceGoals, VariantInfo
 from crosscheck.records.packing import pack
 from crosscheck.running.job import MAIN, REFINED, Job, with_efforts
 from crosscheck.running.scheduler import TIME_LIMIT_S
@@ -34,6 +30,13 @@ from flexmb.scene.schema import Scene
 from flexmb.scene.strains import polynomials
 from flexmb.surrogate import finite_segments, modal_points, rigidify, substructured
 from flexmb.typing import Real
+from flexmb.view.draw import draw
+from flexmb.view.drawing import Drawing
+from flexmb.view.film import film, film_channels
+
+ENGINE = "native"  # of the run for an animation, which is never judged
+FRAMES = 161  # of an animation
+FILM_EFFORT = Effort("tolerance", 1e-10, "dop853")  # if the case prescribes none; else its coarsest is used
 
 
 def plan(

@@ -19,6 +19,7 @@ from flexmb.cli.properties import mass
 from flexmb.cli.running import simulate
 from flexmb.cli.scenes import check, schema
 from flexmb.cli.vibrating import vibrate
+from flexmb.cli.viewing import view
 from flexmb.output.readers import outlive_readers
 
 app = typer.Typer(
@@ -54,7 +55,7 @@ def everything(
 
 
 for command in (
-    simulate, check, mass, equivalence, advise, linearize, campbell, vibrate, export, reduce, schema, warmup
+    simulate, check, mass, equivalence, advise, linearize, campbell, vibrate, view, export, reduce, schema, warmup
 ):  # fmt: skip
     app.command()(command)
 app.command("import")(import_)  # `import` is a keyword and cannot be the name of a function

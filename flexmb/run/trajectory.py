@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
+    from flexmb.view.scene_view import View
+
 
 @dataclass(frozen=True)
 class Trajectory(RunArrays):
@@ -215,6 +217,24 @@ class Trajectory(RunArrays):
         ImportError without rerun-sdk.
         """
         exports.write_recording(self, Path(path))
+
+    def view(self, path: str | os.PathLike[str] | None = None) -> View:
+        """The motion in three dimensions as one HTML page that needs no network; written to `path` if that is given.
+
+        A notebook shows the view that it returns. Up to 201 output times are frames: bodies with beams as they bend,
+        wheels, point masses, connectors, hinges, trails of markers, and arrows of the loads at hinges and closures.
+        ValueError for a trajectory that `simulate` has not made, and for a path that does not end in .html.
+        """
+        from flexmb.view.scene_view import html_file, scene_view  # here, because most runs are not drawn
+
+        made_by = self._making("a view")
+        file = None if path is None else html_file(path)
+        scenes = [system_at(made_by, t).scene for t in self.t.tolist()]
+        states = list(map(State, self.q, self.u, self.t.tolist()))
+        view = scene_view(scenes, states, [name for name, _ in self.q_names], self.message, self.loads)
+        if file is not None:
+            view.save(file)
+        return view
 
     def plot(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Write charts of markers, energy, loads and drives to `folder` as PNG; returns their paths."""

@@ -24,9 +24,10 @@ COMMANDS = {
     "flexmb simulate": (flexmb_cli.app, ["simulate", SCENE, "--t-end", "0.1", "--out"]),
     "flexmb advise": (flexmb_cli.app, ["advise", SCENE, "--out"]),
     "flexmb vibrate": (flexmb_cli.app, ["vibrate", SCENE, "--density", "1:1,2:1", "--picture"]),
+    "flexmb view": (flexmb_cli.app, ["view", SCENE, "--out"]),
     "flexmb campbell": (flexmb_cli.app, ["campbell", SCENE, "pivot", "--rates", "0:1:2", "--picture"]),
 }
-FILES = ("advise", "campbell", "vibrate")  # these write one file, whose folder is asked for
+FILES = ("advise", "campbell", "vibrate", "view")  # these write one file, whose folder is asked for
 
 
 @pytest.fixture
@@ -49,7 +50,8 @@ def test_an_out_path_with_a_file_in_the_way_is_one_line(
 ) -> None:
     (tmp_path / "taken").write_text("mine", encoding="utf-8")
     app, words = COMMANDS[command]
-    given = tmp_path / "taken" / below / ("file.png" if command.endswith(FILES) else ".")
+    file = "file.html" if command.endswith("view") else "file.png"
+    given = tmp_path / "taken" / below / (file if command.endswith(FILES) else ".")
     is_one_line(runner.invoke(app, [*words, str(given)], env=WIDE), str(tmp_path / "taken"))
     assert (tmp_path / "taken").read_text(encoding="utf-8") == "mine"
 

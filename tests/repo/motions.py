@@ -14,11 +14,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import flexmb as fm
-from crosscheck.drawing.draw import draw
-from crosscheck.drawing.film import film
-from crosscheck.records.drawing import CarriedPoint, Drawing, DrawnWheel, Line
 from flexmb.run.trajectory import Trajectory
 from flexmb.typing import Real
+from flexmb.view.draw import draw
+from flexmb.view.drawing import CarriedPoint, Drawing, DrawnWheel, Line
+from flexmb.view.film import film
 from tests.repo.project import ROOT
 
 PAGE = ROOT / "docs" / "motions.md"

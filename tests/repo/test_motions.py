@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import flexmb as fm
-from crosscheck.records.drawing import CarriedPoint, Drawing, Line
+from flexmb.view.drawing import CarriedPoint, Drawing, Line
 from tests.repo import front, motions
 from tests.repo.project import ROOT
 

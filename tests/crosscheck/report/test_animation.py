@@ -6,17 +6,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from crosscheck.drawing.film import film
 from crosscheck.engines.native import NativeEngine
 from crosscheck.engines.registry import PROVIDER
 from crosscheck.judging.results import CaseResults, Result, collect
 from crosscheck.library.find import Case, load_case, resolve
 from crosscheck.records.archive import read
-from crosscheck.records.drawing import FILM, Drawing, DrawnWheel
-from crosscheck.records.kinds import RunRecord
+from crosscheck.records.kinds import FILM, RunRecord
 from crosscheck.records.packing import pack
 from crosscheck.report.animation import animations, wheel_angle
-from crosscheck.report.store import Store
 from crosscheck.running.execute import execute
 from crosscheck.running.plan import plan, variant_scene
 from flexmb.interchange.sid import sid_of, write_sid
@@ -24,6 +21,9 @@ from flexmb.scene.bodies import BeamStation, Modes, SidBody
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.connectors import HingeFriction
 from flexmb.typing import Real
+from flexmb.view.drawing import Drawing, DrawnWheel
+from flexmb.view.film import film
+from flexmb.view.store import Store
 from tests.crosscheck.sessions import CASE, shipped
 from tests.flexmb.interchange.made_bodies import beam, swinging
 

@@ -14,8 +14,9 @@ import matplotlib.image
 import numpy as np
 import pytest
 
+import flexmb as fm
 from crosscheck.judging.outcome import SessionOutcome
-from crosscheck.library.find import resolve
+from crosscheck.library.find import resolve, shipped_folder
 from crosscheck.report import write_all
 from crosscheck.report.measured import write_measured
 from crosscheck.running.scheduler import Limits
@@ -360,3 +361,23 @@ def test_a_measured_set_is_drawn(reader: Reader, tmp_path: Path, size: tuple[int
     assert reader.run("return document.querySelectorAll('.bars .point').length") == 2
     assert reader.run("return document.documentElement.scrollWidth") <= size[0]
     assert not reader.errors()
+
+
+def test_a_view_of_a_run_moves_and_shows_its_loads(reader: Reader, tmp_path: Path) -> None:
+    """The page of `Trajectory.view`, which loads nothing."""
+    file = tmp_path / "view.html"
+    fm.simulate(fm.load_scene(shipped_folder() / "pendulums" / "double" / "scene.toml"), 1.0).view(file)
+    reader.open(file)
+    reader.wait("return Boolean(document.querySelector('.animation').view)")
+    still = reader.picture(".animation canvas")
+    assert len(hues(still)) >= 2
+    reader.run("const v = document.querySelector('.animation').view; v.phase = 0.4; v.draw()")
+    moved = reader.picture(".animation canvas")
+    assert np.mean(np.abs(moved - still) > 0.1) > 0.005
+    reader.run("const c = document.querySelector('.loads'); c.value = ''; c.onchange()")
+    without = reader.picture(".animation canvas")
+    assert np.count_nonzero(np.any(np.abs(without - moved) > 0.1, axis=2)) > 50  # pixels of the arrows, which are gone
+    reader.run("document.querySelector('.animation').view.draw()")
+    assert np.array_equal(reader.picture(".animation canvas"), without)
+    assert reader.run("return performance.getEntriesByType('resource').length") == 0
+    assert reader.errors() == []

@@ -14,8 +14,8 @@ from crosscheck.library.find import load_case, resolve
 from crosscheck.report import SessionOutcome, write_all
 from crosscheck.report.case_view import transformation
 from crosscheck.report.html import code
-from crosscheck.report.store import SAMPLES, Store
 from crosscheck.running.plan import plan
+from flexmb.view.store import SAMPLES, Store
 from tests.crosscheck.report.reading import data_of, series_of
 from tests.crosscheck.sessions import CASE, PROVIDER, copy_case, sweep_here, versus
 

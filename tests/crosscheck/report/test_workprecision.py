@@ -21,8 +21,8 @@ from crosscheck.records.archive import read
 from crosscheck.records.kinds import CaseRecord, Record, RecordedReference, ReferenceGoals, RunRecord
 from crosscheck.records.packing import pack, unpack
 from crosscheck.report.speed import REACHED, fastest, standing, unit_of_time
-from crosscheck.report.store import Store
 from crosscheck.report.workprecision import Point, WorkPrecision, work_precision
+from flexmb.view.store import Store
 from tests.crosscheck.report.reading import series_of
 from tests.crosscheck.report.sessions import MANY, session
 from tests.crosscheck.sessions import copy_case, sweep_here

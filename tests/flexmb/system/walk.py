@@ -30,6 +30,7 @@ UNTRIED = {  # what users may ask all the same: docs/threads.md
     "Trajectory.plot": "draws by matplotlib, whose figures are for one thread",
     **{f"{each}.plot": "draws by matplotlib, whose figures are for one thread"
        for each in ("Campbell", "SampledModel", "MultiplierMap")},
+    "Trajectory.view": "draws: one page at a time is enough",
     "Trajectory.to_rerun": "writes by the library rerun",
 }  # fmt: skip
 EXEMPT = {

@@ -1,11 +1,12 @@
-// Animation of a scene by three.js: solids, arms, wheels and bent beams that move with markers. Data: see animation.py.
+// Animation of a scene by three.js: solids, arms, wheels and bent beams that move with markers. Data: see drawing.py and scene_view.py.
 "use strict";
 const TRAIL = 60, RING = 8, FINER = 8; // frames of a trail; sides of a tube; pieces between two nodes of a beam
 const SHORTEST_LOOP_S = 4, LONGEST_LOOP_S = 12, FAR = 4; // a motion this many bodies wide is followed by the camera
 const VIEW_DEG = 32;
 const SIGNS = { play: "M3 1 L14 8 L3 15 Z", pause: "M2 1 H6 V15 H2 Z M10 1 H14 V15 H10 Z" };
 const BODIES = ["#1d69b1", "#d1495b", "#2a9d6f", "#c38600", "#7c52b6", "#0f8b8d", "#a74b40", "#556984", "#b917a1", "#497215"];
-const CONNECTORS = { spring: ["#2b2b2b", "#e0e0e0"], mount: ["#d97500", "#ffa940"] }, NAMES_OF = { spring: "springs", mount: "bushings, springs in hinges" };
+const CONNECTORS = { spring: ["#2b2b2b", "#e0e0e0"], mount: ["#d97500", "#ffa940"], joint: ["#5a6572", "#c3ccd6"] }, NAMES_OF = { spring: "springs", mount: "bushings, springs in hinges", joint: "hinges, closures" };
+const ARROWS = { force: ["#b3261e", "#ff8a80"], torque: ["#6a1b9a", "#ce93d8"] }; // loads at hinges
 const TURNS = 7, PER_TURN = 8; // of the coil that a spring is drawn as
 const AXES = ["#d43c3c", "#3a8f3e", "#2f74c9"], TRAIL_TONE = "#d1495b";
 
@@ -43,6 +44,14 @@ class SceneView {
     this.canvas.onkeydown = event => this.key(event);
     this.canvas.onfocus = () => this.hold(true);
     this.canvas.onblur = () => this.hold(false);
+    this.arrowKind = "force";
+    if (animations.some(a => a.arrows?.length)) {
+      const chooser = document.createElement("select");
+      chooser.setAttribute("aria-label", "loads shown"); chooser.className = "loads";
+      for (const [kind, text] of [["force", "forces at hinges"], ["torque", "torques at hinges"], ["", "no loads"]]) chooser.add(new Option(text, kind));
+      chooser.onchange = () => { this.arrowKind = chooser.value; this.draw(); };
+      host.querySelectorAll(".controls")[1].append(chooser);
+    }
     this.sign(); this.load(first);
     new ResizeObserver(() => { this.fitCanvas(); this.draw(); }).observe(this.canvas);
     dark.addEventListener("change", () => this.load(this.number));
@@ -195,12 +204,21 @@ class SceneView {
     for (const line of this.shown.lines) {
       const material = new THREE.MeshLambertMaterial({ color: colour.get(line.body) || connectorTone(line.kind), side: THREE.DoubleSide });
       if (line.kind === "solid") this.carrier(line.points[0][0]).add(...solid(line.points.map(p => p.slice(1, 4)), material));
-      else if (line.kind === "ball" || line.kind === "mount") for (const point of line.points) this.carrier(point[0]).add(dot(line.kind, point, 4.5 * thin, material));
+      else if (["ball", "mount", "joint"].includes(line.kind)) for (const point of line.points) this.carrier(point[0]).add(dot(line.kind, point, (line.kind === "joint" ? 2.4 : 4.5) * thin, material));
       else this.tubes.push(new Tube(this.world, line, { beam: 1.8, spring: 0.45 }[line.kind] * thin || thin, material));
     }
     for (const wheel of this.shown.wheels) {
       const disc = wheelMesh(wheel, thin); this.carrier(wheel.marker).add(disc);
       this.spinning.push([disc, wheel, this.series[wheel.angle][0]]);
+    }
+    // The longest arrow of a kind is a third of what the view reaches.
+    const largest = { force: 0, torque: 0 };
+    this.arrows = (this.shown.arrows || []).map(({ kind, marker, values }) => ({ kind, marker, values: this.series[values] }));
+    for (const { kind, values: [x, y, z] } of this.arrows) x.forEach((v, f) => { largest[kind] = Math.max(largest[kind], Math.hypot(v, y[f], z[f])); });
+    for (const arrow of this.arrows) {
+      arrow.scale = largest[arrow.kind] > 0 ? this.reach / 3 / largest[arrow.kind] : 0;
+      arrow.mesh = arrowMesh(thin, new THREE.MeshLambertMaterial({ color: ARROWS[arrow.kind][dark.matches ? 1 : 0] }));
+      this.world.add(arrow.mesh);
     }
     AXES.forEach((tone, k) => {
       const tip = [0, 0, 0]; tip[k] = 0.2 * this.reach;
@@ -236,6 +254,14 @@ class SceneView {
     }
     for (const tube of this.tubes) tube.bend(tube.line.points.map(point => this.place(point, s)));
     const g = Math.min(whole + 1, this.frames - 1);
+    for (const { kind, marker, values, scale, mesh } of this.arrows) {
+      const v = new THREE.Vector3(...values.map(c => scale * (c[whole] + (s - whole) * (c[g] - c[whole])))), length = v.length();
+      mesh.visible = kind === this.arrowKind && length > 0.01 * this.reach;
+      if (!mesh.visible) continue;
+      mesh.position.set(...this.pose(marker, s)[0]);
+      mesh.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), v.normalize());
+      mesh.children[0].scale.y = length; mesh.children[1].position.y = length;
+    }
     for (const [disc, , angle] of this.spinning) disc.children[0].rotation.y = angle[whole] + (s - whole) * (angle[g] - angle[whole]);
     for (const [m, geometry] of this.trails) {
       const first = Math.max(0, whole - TRAIL), points = geometry.attributes.position;
@@ -288,10 +314,18 @@ function solid(corners, material) {
 
 // A point mass or the mark of a connector, fixed to a marker.
 function dot(kind, [, x, y, z], size, material) {
-  const [around, down] = kind === "ball" ? [20, 14] : [4, 2]; // a mark is an octahedron
+  const [around, down] = kind === "mount" ? [4, 2] : [20, 14]; // a mark is an octahedron
   const mesh = new THREE.Mesh(new THREE.SphereGeometry(size, around, down), material);
   mesh.position.set(x, y, z);
   return mesh;
+}
+
+// An arrow along y with its tail at the origin, of unit length: a shaft that is stretched, and a head at its end.
+function arrowMesh(thin, material) {
+  const arrow = new THREE.Group(), shaft = new THREE.CylinderGeometry(0.5 * thin, 0.5 * thin, 1, 12), head = new THREE.CylinderGeometry(0, 1.8 * thin, 5 * thin, 16);
+  shaft.translate(0, 0.5, 0);
+  arrow.add(new THREE.Mesh(shaft, material), new THREE.Mesh(head, material));
+  return arrow;
 }
 
 function connectorTone(kind) { return CONNECTORS[kind][dark.matches ? 1 : 0]; }

@@ -1,12 +1,12 @@
-"""The drawing of a scene in records: lines, solids and wheels that move with markers."""
+"""The drawing of a scene as data: lines, solids and wheels that move with markers."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import msgspec
 
 from flexmb.scene.bodies import ZERO, Vector
-
-FILM = "film"  # the role of a run that is made for the animation
 
 
 class CarriedPoint(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
@@ -57,3 +57,35 @@ class Drawing(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     trails: tuple[str, ...]
     wheels: tuple[DrawnWheel, ...] = ()
     gravity: Vector = ZERO
+
+
+def carriers(drawing: Drawing) -> list[str]:
+    """Markers that carry something or leave a trail, each once."""
+    carrying = [point.marker for line in drawing.lines for point in line.points if point.marker]
+    return list(dict.fromkeys((*carrying, *(wheel.marker for wheel in drawing.wheels), *drawing.trails)))
+
+
+# What page/scene.js reads: `number` has the places of markers in its list, and -1 stands for the World.
+
+
+def carried_point(point: CarriedPoint, number: dict[str, int]) -> list[float]:
+    """[marker, offset, tangent]."""
+    return [number.get(point.marker, -1), *point.offset, *point.tangent]
+
+
+def carried_line(line: Line, number: dict[str, int]) -> dict[str, Any]:
+    """A line with its points."""
+    return {"body": line.body, "kind": line.kind, "points": [carried_point(point, number) for point in line.points]}
+
+
+def carried_wheel(wheel: DrawnWheel, number: dict[str, int], angle: int) -> dict[str, Any]:
+    """A wheel; `angle` is the number of the series of its angle relative to the marker (rad)."""
+    return {
+        "name": wheel.name,
+        "marker": number[wheel.marker],
+        "centre": wheel.centre,
+        "axis": wheel.axis,
+        "radius": wheel.radius_m,
+        "width": wheel.width_m,
+        "angle": angle,
+    }

@@ -13,14 +13,14 @@ from typing import assert_never
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from crosscheck.engines.functions_of_time import profile
-from crosscheck.records.drawing import CarriedPoint, Drawing, DrawnWheel, Line
 from flexmb.scene.bodies import ZERO, BeamBody, Body, ModalBody, RigidBody, SidBody, Vector
+from flexmb.scene.check.profiles import start_of
 from flexmb.scene.connectors import BetweenNodes, HingeSpring
 from flexmb.scene.rest_curve import rest_sections
 from flexmb.scene.schema import Marker, Scene, Wheel
 from flexmb.scene.tree import GROUND, ends, node_frame, nodes_along
 from flexmb.typing import Real
+from flexmb.view.drawing import CarriedPoint, Drawing, DrawnWheel, Line
 
 LARGEST_ASPECT = 12.0
 THINNEST_WHEEL = 0.1  # least drawn width of a wheel over its radius
@@ -57,17 +57,17 @@ def _rigid(scene: Scene, body: RigidBody, marker: Marker) -> list[Line]:
     """The box of equal inertia, and arms from the mass centre to the joints of the body."""
     position, rotation = _pose(body, marker)
 
-    def carried(point: Real) -> CarriedPoint:
+    def fixed(point: Real) -> CarriedPoint:
         return CarriedPoint(marker.name, _vector(rotation.inv().apply(point - position)))
 
     com = np.array(body.com_m)
     if np.any(body.inertia_kg_m2):
-        lines = [Line(body=body.name, kind="solid", points=tuple(map(carried, _corners(body))))]
+        lines = [Line(body=body.name, kind="solid", points=tuple(map(fixed, _corners(body))))]
     else:
-        lines = [Line(body=body.name, kind="ball", points=(carried(com),))] if body.mass_kg else []
+        lines = [Line(body=body.name, kind="ball", points=(fixed(com),))] if body.mass_kg else []
     for joint in _joints(scene, body):
         if np.any(joint != com):
-            lines.append(Line(body=body.name, kind="arm", points=(carried(com), carried(joint))))
+            lines.append(Line(body=body.name, kind="arm", points=(fixed(com), fixed(joint))))
     return lines
 
 
@@ -75,7 +75,7 @@ def _masses(scene: Scene) -> list[Line]:
     """Fixed point masses; moving ones are bodies in a film."""
     lines = []
     for mass in scene.point_masses:
-        point = None if mass.directions else _carried(scene, mass.body, mass.node, mass.offset_m)
+        point = None if mass.directions else carried(scene, mass.body, mass.node, mass.offset_m)
         if point is not None:
             lines.append(Line(body=mass.name, kind="ball", points=(point,)))
     return lines
@@ -88,17 +88,17 @@ def _connectors(scene: Scene) -> list[Line]:
         kind, points = "mount", []
         if isinstance(connector, BetweenNodes):
             kind = "mount" if hasattr(connector, "quaternion_a") else "spring"  # between frames or between points
-            points = [_carried(scene, end.body, end.node, end.position_m) for end in ends(connector)]
+            points = [carried(scene, end.body, end.node, end.position_m) for end in ends(connector)]
         elif isinstance(connector, HingeSpring):
             hinges = [hinge for hinge in scene.hinges if hinge.name == connector.hinge]
-            points = [_carried(scene, hinge.child, hinge.child_node, hinge.child_position_m) for hinge in hinges]
+            points = [carried(scene, hinge.child, hinge.child_node, hinge.child_position_m) for hinge in hinges]
         seen = tuple(point for point in points if point is not None)
         if seen and len(seen) == len(points):
             lines.append(Line(body=connector.name, kind=kind, points=seen))
     return lines
 
 
-def _carried(scene: Scene, body: str, node: str, offset: Vector) -> CarriedPoint | None:
+def carried(scene: Scene, body: str, node: str, offset: Vector) -> CarriedPoint | None:
     """A point at a node of a body or of the ground; None if no marker moves with it."""
     if body == GROUND:
         return CarriedPoint("", offset)
@@ -161,7 +161,7 @@ def _root_point(scene: Scene, body: Body) -> CarriedPoint | None:
         return CarriedPoint("", hinge.parent_position_m)
     if not isinstance(next(body for body in scene.bodies if body.name == hinge.parent), RigidBody):
         return None
-    return _carried(scene, hinge.parent, hinge.parent_node, hinge.parent_position_m)
+    return carried(scene, hinge.parent, hinge.parent_node, hinge.parent_position_m)
 
 
 def _corners(body: RigidBody) -> list[Real]:
@@ -204,7 +204,7 @@ def _wheel(body: Body, wheel: Wheel, marker: Marker) -> DrawnWheel:
     position, rotation = _pose(body, marker)
     axis = _rotation(node_frame(body, wheel.node).quaternion).apply(np.array(wheel.axis) / np.linalg.norm(wheel.axis))
     radius = float(np.sqrt(2.0 * wheel.axial_inertia_kg_m2 / wheel.mass_kg))
-    spin = None if wheel.prescribed_rad is None else profile(wheel.prescribed_rad)(0.0)
+    spin = None if wheel.prescribed_rad is None else start_of(wheel.prescribed_rad)
     width = 12.0 * (wheel.transverse_inertia_kg_m2 - wheel.axial_inertia_kg_m2 / 2.0) / wheel.mass_kg
     return DrawnWheel(
         name=wheel.name,
@@ -214,8 +214,8 @@ def _wheel(body: Body, wheel: Wheel, marker: Marker) -> DrawnWheel:
         radius_m=radius,
         width_m=max(float(np.sqrt(max(width, 0.0))), THINNEST_WHEEL * radius),
         axial_inertia_kg_m2=wheel.axial_inertia_kg_m2,
-        speed_rad_s=wheel.speed_rad_s if spin is None else spin.rate,
-        angle_rad=wheel.angle_rad if spin is None else spin.value,
+        speed_rad_s=wheel.speed_rad_s if spin is None else spin[1],
+        angle_rad=wheel.angle_rad if spin is None else spin[0],
     )
 
 

@@ -1,8 +1,7 @@
-"""The run for an animation: the scene with markers on every body, and additional ones along beams.
+"""The scene of an animation: with markers on every body, and additional ones along beams.
 
-The markers of a case are those that it judges, and many bodies have none. So the animation has a run of its own by the
-native engine, which is never judged. If the case prescribes efforts, the coarsest is used, which is off by a thousandth
-of the motion at most.
+The markers of a case are those that it judges, and many bodies have none. So its animation has a run of its own, which
+is never judged; a view of a trajectory finds the poses of the additional markers at its states instead.
 """
 
 from __future__ import annotations
@@ -12,19 +11,15 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from crosscheck.drawing.draw import draw
-from crosscheck.engines.contract import Effort
-from crosscheck.records.drawing import Drawing
 from flexmb.interchange.sid.blocks import SidError
 from flexmb.interchange.sid.to_body import with_sid_bodies
 from flexmb.scene.bodies import BeamBody, BeamNode, Body, RigidBody
 from flexmb.scene.hinges import LinearCoordinate, Prismatic
 from flexmb.scene.schema import Marker, Scene
 from flexmb.scene.tree import coordinates, rest_frames
+from flexmb.view.draw import draw
+from flexmb.view.drawing import Drawing
 
-ENGINE = "native"
-FRAMES = 161
-EFFORT = Effort("tolerance", 1e-10, "dop853")  # if the case prescribes none
 PIECES, PIECES_OF_EXACT = 6, 12  # into which additional nodes divide a beam, and one that may bend to circles
 ADDED = "drawn"
 NO_INERTIA = ((0.0,) * 3,) * 3
@@ -33,15 +28,21 @@ NO_INERTIA = ((0.0,) * 3,) * 3
 def film(scene: Scene) -> tuple[Scene, Drawing] | None:
     """The scene to run and its drawing; None if the scene's own markers suffice or a SID file cannot be read."""
     try:
-        filmed = _hung(with_sid_bodies(scene))
+        filmed = hung(with_sid_bodies(scene))
     except (SidError, OSError):  # the case's runs report the error
         return None
     carried = {marker.body for marker in scene.markers}
     if filmed is scene and all(isinstance(body, RigidBody) and body.name in carried for body in scene.bodies):
         return None
-    for body in filmed.bodies:
-        filmed = _with_markers(filmed, body)
+    filmed = marked(filmed)
     return filmed, draw(filmed, trails=[marker.name for marker in scene.markers])
+
+
+def marked(scene: Scene) -> Scene:
+    """The scene with markers on all nodes that are drawn, those that are added along beams included."""
+    for body in scene.bodies:
+        scene = _with_markers(scene, body)
+    return scene
 
 
 def film_channels(drawing: Drawing) -> tuple[str, ...]:
@@ -56,7 +57,7 @@ def film_channels(drawing: Drawing) -> tuple[str, ...]:
     return tuple(dict.fromkeys(channels))
 
 
-def _hung(scene: Scene) -> Scene:
+def hung(scene: Scene) -> Scene:
     """The scene with moving point masses replaced by bodies on slides, to which markers can be fixed, unless a
     connector, sensor or event refers to them."""
     watching = msgspec.json.encode((scene.connectors, scene.sensors, scene.events)).decode()

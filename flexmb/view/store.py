@@ -1,8 +1,8 @@
-"""Series of numbers for the report: thinned, each stored once, and packed.
+"""Series of numbers for a page: thinned, each stored once, and packed.
 
 All series of a page are one stream of float32, column by column. It contains the differences of successive bit
 patterns, with the bytes of equal significance together, deflated and in base64:
-`templates/data.js` unpacks it. Smooth signals are reduced to a third of their size without loss.
+`page/unpack.js` unpacks it. Smooth signals are reduced to a third of their size without loss.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.judging.results import Result
 from flexmb.typing import Real
 
 SAMPLES = 201
@@ -30,20 +29,16 @@ class Store:
         self._numbers: dict[bytes, int] = {}
 
     def times(self, times: Real) -> int:
-        return self._add(times[_chosen(len(times))])
-
-    def signal(self, result: Result, channel: str) -> int:
-        """Number of a thinned channel (T, k) of a result's last run."""
-        return self.samples(result.values(channel))
+        return self._add(times[chosen(len(times))])
 
     def samples(self, values: Real) -> int:
         """Number of thinned values (T, k) or (T,)."""
-        return self._add(values[_chosen(len(values))])
+        return self._add(values[chosen(len(values))])
 
     def peaks(self, values: Real) -> int:
         """Number of a non-negative curve (T,), thinned by the maximum in each interval."""
-        chosen = _chosen(len(values))
-        starts = np.concatenate([[0], chosen[:-1] + 1])
+        kept = chosen(len(values))
+        starts = np.concatenate([[0], kept[:-1] + 1])
         return self._add(np.maximum.reduceat(values, starts))
 
     def packed(self) -> dict[str, Any]:
@@ -72,6 +67,6 @@ def _differences(column: NDArray[np.float32]) -> NDArray[np.uint32]:
     return np.diff(bits, prepend=np.zeros(1, dtype="<u4")).astype("<u4")
 
 
-def _chosen(count: int) -> NDArray[np.intp]:
+def chosen(count: int) -> NDArray[np.intp]:
     """Indices of at most SAMPLES samples, first and last among them."""
     return np.unique(np.linspace(0, count - 1, min(count, SAMPLES)).round().astype(np.intp))

@@ -1,0 +1,82 @@
+"""`flexmb view`: a scene in three dimensions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.text import Text
+
+from flexmb.cli.terminal import EXIT_STOPPED, NoUserCode, SceneFile, console, no_traceback
+from flexmb.output.files import check_folder
+from flexmb.output.printable import printable
+
+if TYPE_CHECKING:
+    from flexmb.scene.schema import Scene
+    from flexmb.view.scene_view import View
+
+
+def view(
+    scene: SceneFile,
+    t_end: Annotated[float | None, typer.Option("--t-end", help="Run to this time in s.", show_default=False)] = None,
+    mode: Annotated[
+        int | None,
+        typer.Option(help="Number of a mode, as `flexmb linearize` lists them.", show_default=False, min=1),
+    ] = None,
+    out: Annotated[Path, typer.Option("--out", "-o", help="File, which ends in .html.")] = Path("out/view.html"),
+    no_user_code: NoUserCode = False,
+) -> None:
+    """
+    Write a scene in three dimensions as one HTML page that needs no network: its start, a run, or a mode.
+
+    **Examples**
+
+        flexmb view boom.toml
+        flexmb view boom.toml --t-end 60 --out boom.html
+        flexmb view boom.toml --mode 3
+
+    A run is one by default settings. A mode is that about the equilibrium, with an amplitude for display.
+
+    **Exit code**: 0 written, 1 the run stopped before its end (what was reached is written) or no equilibrium was
+    found, 2 the scene or an option is wrong.
+    """
+    with no_traceback():
+        from flexmb.scene.files import load_scene
+        from flexmb.view.scene_view import html_file
+
+        if t_end is not None and mode is not None:
+            raise ValueError("--t-end and --mode exclude each other: a page shows a run or a mode")
+        check_folder(html_file(out).parent)
+        loaded, message = load_scene(scene), ""
+        with console.status(Text(f"drawing {scene} (the first time after an update compiles)")):
+            if t_end is not None:
+                from flexmb.run.simulate import simulate
+
+                run = simulate(loaded, t_end)
+                shown, message = run.view(), "" if run.finished else run.message
+            else:
+                shown = _start(loaded) if mode is None else _mode(loaded, mode)
+            shown.save(out)
+        if message:
+            console.print(Text(printable(message), style="yellow"))
+        console.print("wrote", str(out), soft_wrap=True)
+    if message:
+        raise typer.Exit(EXIT_STOPPED)
+
+
+def _start(scene: Scene) -> View:
+    """The scene at its initial state."""
+    from flexmb.system.compile import compile as compiled
+    from flexmb.view.scene_view import scene_view
+
+    system = compiled(scene)
+    state, (names, _) = system.initial_state, system.state_names
+    return scene_view([system.scene], [state], [name for name, _ in names], "initial state")
+
+
+def _mode(scene: Scene, number: int) -> View:
+    """A mode about the equilibrium over one period."""
+    from flexmb.linear.mode_view import mode_view
+
+    return mode_view(scene, number)
