@@ -23,7 +23,7 @@ from flexmb.sensitivity.adjoint.run_backwards import Adjoint
 from flexmb.sensitivity.channels import refuse_undetermined, refuse_unknown_outputs
 from flexmb.sensitivity.gate import admitted, is_passed_backwards
 from flexmb.sensitivity.parts import Passage
-from flexmb.sensitivity.readings import Reading, summed_forwards
+from flexmb.sensitivity.readings import ScalarReading, summed_forwards
 from flexmb.sensitivity.scalars import ScalarTerm, terms_of
 from flexmb.sensitivity.sensitivities import METHODS, SHARE
 from flexmb.tables import arguments
@@ -100,7 +100,7 @@ def gradient(
     if not trajectory.finished or trajectory.t[-1] < t_end:
         raise DynamicsError(f"there is no gradient of a run that does not reach t = {t_end:g} s: {trajectory.message}")
     refuse_undetermined(trajectory, [name for term in terms for name in term.channels])
-    reading, found = Reading(terms, course, given), gated.numbers
+    reading, found = ScalarReading(terms, course, given), gated.numbers
     steps, checkpoints = sum(int(leg.raw.counts[ACCEPTED]) for leg in course), 0
     if is_passed_backwards(scene):
         adjoint = Adjoint(gated, reading, given)

@@ -64,7 +64,7 @@ class Left(NamedTuple):
     integrands: list[float]
 
 
-class Reading:
+class ScalarReading:
     """The scalar that is the sum of some terms. value: of those of its instants that were read."""
 
     def __init__(self, terms: Sequence[ScalarTerm], course: Sequence[Leg], settings: Settings) -> None:
@@ -109,7 +109,7 @@ def _cuts(course: Sequence[Leg], settings: Settings) -> list[float]:
     return sorted(set(cuts))
 
 
-def summed_forwards(passage: Passage, reading: Reading, course: Sequence[Leg], directions: int) -> Real:
+def summed_forwards(passage: Passage, reading: ScalarReading, course: Sequence[Leg], directions: int) -> Real:
     """The derivatives (P,) of a scalar along the `directions` of a passage, by those of the state at each instant that
     it reads: for runs that the adjoint does not pass. It costs as much as `sensitivities` by as many numbers."""
     total, left = np.zeros(directions), None

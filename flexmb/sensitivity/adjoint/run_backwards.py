@@ -28,7 +28,7 @@ from flexmb.sensitivity.adjoint.sampling import SampledLoop
 from flexmb.sensitivity.gate import Admitted
 from flexmb.sensitivity.leg import Course, Variation, clock_of_leg
 from flexmb.sensitivity.parts import Passage
-from flexmb.sensitivity.readings import ChannelRates, Left, Reading
+from flexmb.sensitivity.readings import ChannelRates, Left, ScalarReading
 from flexmb.sensitivity.scalars import Probe
 from flexmb.typing import Index, Real
 
@@ -39,7 +39,7 @@ class Adjoint:
     cost: of the steps, which is known after the call.
     """
 
-    def __init__(self, admitted: Admitted, reading: Reading, settings: Settings) -> None:
+    def __init__(self, admitted: Admitted, reading: ScalarReading, settings: Settings) -> None:
         self._admitted, self._reading, self._settings = admitted, reading, settings
         self._numbers = admitted.numbers
         self.cost = StepCost(0, 0, 0, 0)

@@ -53,7 +53,7 @@ class SceneView {
       host.querySelectorAll(".controls")[1].append(chooser);
     }
     this.sign(); this.load(first);
-    new ResizeObserver(() => { this.fitCanvas(); this.draw(); }).observe(this.canvas);
+    new ResizeObserver(() => { this.fitCanvas(); if (!this.turned) this.stand(); this.draw(); }).observe(this.canvas);
     dark.addEventListener("change", () => this.load(this.number));
     // It plays while visible, unless the reader stopped it or prefers reduced motion.
     this.wanted = !calm.matches;
@@ -88,6 +88,7 @@ class SceneView {
     else if (step && event.shiftKey) this.turn(step, event.key.endsWith("Up") || event.key.endsWith("Down"));
     else if (step) this.phase = Math.min(1, Math.max(0, this.phase + step / Math.max(1, this.frames - 1)));
     else return;
+    this.turned ||= "+-".includes(event.key) || event.shiftKey;
     event.preventDefault(); this.controls.update(); this.draw();
   }
 
@@ -167,16 +168,21 @@ class SceneView {
     this.camera = new THREE.PerspectiveCamera(VIEW_DEG, 4 / 3, this.reach / 50, this.reach * 200);
     this.camera.up.set(...up);
     this.fitCanvas();
-    const direction = new THREE.Vector3(...way).normalize();
+    this.direction = new THREE.Vector3(...way).normalize();
     this.target = this.following ? mean([...this.points(0)]) : this.middle;
-    this.camera.position.set(...this.target).addScaledVector(direction, this.distance(direction));
+    this.turned = false;
+    this.stand();
     this.controls?.dispose();
     this.controls = new THREE.OrbitControls(this.camera, this.canvas);
     this.controls.target.set(...this.target);
     this.controls.addEventListener("change", () => this.draw());
+    this.controls.addEventListener("start", () => { this.turned = true; });
     this.controls.update();
     this.hold(document.activeElement === this.canvas);
   }
+
+  // The camera where all is visible, until the reader moves it.
+  stand() { this.camera.position.set(...this.target).addScaledVector(this.direction, this.distance(this.direction)); this.controls?.update(); }
 
   // The distance of the camera in a direction at which every point of the motion is visible.
   distance(direction) {

@@ -43,6 +43,7 @@ NOT_IN_SCENES = {
     **{f"{law}.{key}": "as of a Pid" for law in ("GainTable", "Saturation", "StateSpace", "UserLaw")
        for key in ("period_s", "offset_s", "delay_s")},
     "SidBody.stiffness_factor": "as of the ModalBody that it becomes, see tests/flexmb/modal/test_stiffness_factor",
+    "Dock.tolerance_m": "no number that a motion depends on: what is refused", "Dock.tolerance_rad": "likewise",
     "ModalBody.gradient_stiffness": "stiffness under loads, from other codes",
     "ModalBody.gravity_stiffness": "likewise", "ModalNode.force_stiffness": "likewise",
 }  # fmt: skip
