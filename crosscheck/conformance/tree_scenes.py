@@ -119,7 +119,8 @@ def bending() -> SceneBuilder:
     """
     x = (0.2, 0.5, 0.8, 1.0)
     shapes = [[[0.0, 0.0], [0.3 * a * a, a - 0.6 * a * a], [0.0, 0.0]] for a in x]  # by component, then by mode
-    points = inertia_points([0.3, 0.5, 0.4, 0.2], [(a, 0.1, -0.2 * a) for a in x], shapes)
+    # Off a line, about which the body would have no inertia where it is straight.
+    points = inertia_points([0.3, 0.5, 0.4, 0.2], [(a, 0.1 - 0.4 * a * (1.0 - a), -0.2 * a) for a in x], shapes)
     port = make(
         ModalNode, name="port", position=(1.0, 0.0, 0.1), quaternion=_PORT["quaternion"],
         translation_modes=[[-0.05, 0.3, 0.0], [0.02, 0.4, 0.0]], rotation_modes=[[0.0, 0.0, 0.6], [0.0, 0.0, -0.2]],

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import assert_never
 
+import numpy as np
+
 from crosscheck.engines.contract import Model
 from crosscheck.engines.peer import PeerEngine
 from crosscheck.engines.scipy_loop import METHODS, RTOL_LADDER, ScipyModel
@@ -23,9 +25,17 @@ from flexmb.scene.hinges import (
 )
 from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.schema import Scene
+from flexmb.typing import Real
 
 VERSION = "1"
 """Of the equations: it changes with their answers."""
+
+
+_LEAST = 1e-9  # of the largest moment: below it accelerations of a free body lose the digits that verdicts need
+_SLIM = (
+    "undeformed it has no inertia about some axis, about which a free body would turn at any rate; the equations of "
+    "kane have free bodies: give it some inertia, or take another code"
+)
 
 
 class KaneEngine(PeerEngine):
@@ -89,7 +99,8 @@ def _body_obstacles(body: Body, scene: Scene) -> Iterator[str]:
     what = f'body "{body.name}"'
     match body:
         case RigidBody():
-            pass
+            if not body.mass_kg > 0.0 or _is_slim(np.array(body.inertia_kg_m2)):
+                yield f"{what}: {_SLIM}"
         case SidBody():
             yield f"{what}: its SID file is read by flexmb alone: convert it by flexmb import"
         case ModalBody() | BeamBody() if body.level not in ("rigid", "full"):
@@ -99,10 +110,25 @@ def _body_obstacles(body: Body, scene: Scene) -> Iterator[str]:
             arrays = modal_arrays(body)
             if arrays.inertia.any() or arrays.com_offset.any():
                 yield f'{what}: its points have inertia of their own: use massy section points (points = "section")'
+            elif not arrays.mass.sum() > 0.0 or _is_slim(_inertia(arrays.mass, arrays.position)):
+                yield f"{what}: {_SLIM}"
         case BeamBody():
             yield from _beam_obstacles(body, scene)
         case _:
             assert_never(body)
+
+
+def _inertia(mass: Real, position: Real) -> Real:
+    """(3,3) kg m^2 of point masses (n,) at `position` (n,3) about their mass centre."""
+    arm = position - mass @ position / mass.sum()
+    second = arm.T @ (mass[:, None] * arm)
+    return np.asarray(np.trace(second) * np.eye(3) - second)
+
+
+def _is_slim(inertia: Real) -> bool:
+    """Whether an inertia (3,3) about the mass centre has next to none about an axis."""
+    moments = np.linalg.eigvalsh(inertia)
+    return not moments[0] > _LEAST * moments[-1]
 
 
 def _beam_obstacles(body: BeamBody, scene: Scene) -> Iterator[str]:

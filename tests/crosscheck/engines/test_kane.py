@@ -8,6 +8,7 @@ import pytest
 from msgspec.structs import replace
 
 import flexmb as fm
+from crosscheck.conformance.tree_scenes import bending
 from crosscheck.engines.contract import Effort, Run, Snapshot
 from crosscheck.engines.kane import KaneEngine
 from crosscheck.engines.kane.beam import BendingBeam
@@ -227,6 +228,20 @@ def test_what_it_has_not_is_refused_by_name(scene: s.Scene, words: str) -> None:
     assert support.kind == "no" and words in support.reason
     with pytest.raises(ValueError, match=f'scene "{scene.name}"'):
         KaneEngine().compile(scene)
+
+
+def test_bodies_without_inertia_about_an_axis_are_refused() -> None:
+    """Their free bodies would turn at any rate, and a run would not end; beside the line the same masses are taken."""
+    hub = next(i for i, body in enumerate(BOOM.bodies) if body.name == "hub")
+    slim = replace(BOOM.bodies[hub], inertia_kg_m2=((0.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
+    rods = [slim if i == hub else body for i, body in enumerate(BOOM.bodies)]
+    assert "no inertia about some axis" in KaneEngine().supports(replace(BOOM, bodies=tuple(rods))).reason
+    tree = bending().scene()
+    assert KaneEngine().supports(tree).kind == "exact"
+    middle = next(body for body in tree.bodies if isinstance(body, s.ModalBody))
+    on_a_line = tuple(replace(point, position_m=(point.position_m[0], 0.0, 0.0)) for point in middle.points)
+    bodies = tuple(replace(body, points=on_a_line) if body is middle else body for body in tree.bodies)
+    assert 'body "middle": undeformed' in KaneEngine().supports(replace(tree, bodies=bodies)).reason
 
 
 def test_points_with_inertia_of_their_own_are_refused() -> None:
