@@ -94,8 +94,10 @@ def gradient(
     refuse_bytes(8.0 * n * (n + len(by)), f"derivatives of {n} coordinates and speeds by themselves take", remedy)
     gated = admitted(scene, by)
     refuse_unknown_outputs(gated.system, [name for term in terms for name in term.channels])
-    for term in terms:
-        list(term.probes(t_end, []))  # refuses what does not fit the run
+    instants = len({probe.t for term in terms for probe in term.probes(t_end, [])})  # refuses what does not fit the run
+    if not is_passed_backwards(scene):  # each instant keeps the derivatives of the state
+        what = f"derivatives of {n} coordinates and speeds by {len(by)} numbers at {instants} instants take"
+        refuse_bytes(8.0 * instants * n * (1 + len(by)), what, "give fewer panels or numbers")
     trajectory, course = run_with_course(gated.system, np.array([0.0, t_end]), given)
     if not trajectory.finished or trajectory.t[-1] < t_end:
         raise DynamicsError(f"there is no gradient of a run that does not reach t = {t_end:g} s: {trajectory.message}")

@@ -12,6 +12,7 @@ import flexmb as fm
 import flexmb.sensitivity.gradient as gradient_module
 from flexmb.parameters.numbers import Number
 from flexmb.ready import scenes
+from flexmb.scene import sizes
 from flexmb.sensitivity.adjoint import arc, part
 from flexmb.sensitivity.adjoint.sampling import SampledLoop
 from tests.flexmb.closure import mechanisms
@@ -379,6 +380,15 @@ def test_integrals_over_an_event_that_moves_under_controllers_against_difference
             (found({name: value + h}).value - found({name: value - h}).value) / (2.0 * h) for h in (2e-4, 1e-4)
         ]  # fmt: skip
         assert exact.derivative(name) == pytest.approx((4.0 * slopes[1] - slopes[0]) / 3.0, rel=1e-7, abs=1e-8)
+
+
+def test_derivatives_at_too_many_instants_are_refused_before_the_run(monkeypatch):
+    """Forwards, each instant keeps the derivatives of the state; backwards none does."""
+    of = fm.TimeIntegral("pivot.rotation", panels=2_000)
+    monkeypatch.setattr(sizes, "MOST_BYTES", 2**20)
+    with pytest.raises(ValueError, match="at 8000 instants take .*give fewer panels or numbers"):
+        fm.gradient(controlled().scene(), 0.1, CONTROLLED, of)
+    assert fm.gradient(controlled(period=0.05).scene(), 0.1, CONTROLLED, of).checkpoints > 0
 
 
 def test_forwards_and_backwards_are_one_gradient(monkeypatch):
