@@ -109,11 +109,22 @@ def export(
     inputs: Annotated[
         list[str] | None,
         typer.Option(
-            "--input", help="--fmu, --c: a load (NAME.function), motor or actuator as input.", show_default=False
+            "--input", help="Not --out: a load (NAME.function), motor or actuator as input.", show_default=False
         ),
     ] = None,
     step: Annotated[
-        float | None, typer.Option(help="--fmu: Co-Simulation too, in equal steps (s).", show_default=False)
+        float | None,
+        typer.Option(help="--fmu: Co-Simulation too, in equal steps (s); --page: its steps.", show_default=False),
+    ] = None,
+    target: Annotated[
+        str | None, typer.Option(help="--c: processors, x86-64-v3 unless given; see below.", show_default=False)
+    ] = None,
+    page: Annotated[
+        Path | None, typer.Option(help="Write a page (.html) that computes the scene.", show_default=False)
+    ] = None,
+    sliders: Annotated[
+        list[str] | None,
+        typer.Option("--slider", help="--page: a number to change, NAME or NAME=LOW,HIGH.", show_default=False),
     ] = None,
     no_user_code: NoUserCode = False,
 ) -> None:
@@ -123,25 +134,29 @@ def export(
         flexmb export boom.toml strip --out strip.sid
         flexmb export boom.toml strip --out strip.SID_FEM --dialect fembs
 
-    Or write the whole scene as a program that needs no Python: an FMU for other simulation tools, which takes a C
-    compiler, or C for one's own program. Both are for Linux on x86-64: see docs/export-fmu.md.
+    Or write the whole scene as a program that needs no Python: an FMU for other simulation tools on Linux on x86-64,
+    which takes a C compiler; C for one's own program on x86-64-v3, aarch64, armv7, cortex-m7, riscv64 or wasm32; or a
+    page that computes its motion in the browser, which takes the extra flexmb[web]: see docs/export-fmu.md.
 
         flexmb export arm.toml --fmu arm.fmu --input shoulder.rotation.torque_Nm --step 1e-4
-        flexmb export arm.toml --c arm
+        flexmb export arm.toml --c arm --target cortex-m7
+        flexmb export array.toml --page array.html --slider hinge.rotation.damping_Nms_rad=0,5
 
     **Exit code**: 0 written, 2 the scene or the body is wrong, or is not exported: the message has the remedy.
     """
     with no_traceback():
-        if (inputs and out is not None) or (step is not None and fmu is None):
-            raise ValueError("--input is for --fmu and --c, --step for --fmu")
-        if sum(target is not None for target in (out, fmu, c)) != 1:
-            raise ValueError("give one of --out FILE (with a BODY), --fmu FILE and --c FOLDER")
+        if (inputs and out is not None) or (step is not None and fmu is None and page is None):
+            raise ValueError("--input is for --fmu, --c and --page, --step for --fmu and --page")
+        if (target is not None and c is None) or (sliders and page is None):
+            raise ValueError("--target is for --c, --slider for --page")
+        if sum(place is not None for place in (out, fmu, c, page)) != 1:
+            raise ValueError("give one of --out FILE (with a BODY), --fmu FILE, --c FOLDER and --page FILE")
         if (body is None) != (out is None):
-            raise ValueError("a BODY is written by --out FILE; --fmu and --c write the whole scene, without a BODY")
+            raise ValueError("a BODY is written by --out FILE; --fmu, --c and --page write whole scenes, without one")
         if body is not None and out is not None:
             _export_body(scene, body, out, dialect)
         else:
-            _export_program(scene, fmu, c, inputs or [], step)
+            _export_program(scene, fmu, c, page, inputs or [], step, target, sliders or [])
 
 
 def _export_body(scene: Path, body: str, out: Path, dialect: Literal["wallrapp", "fembs"]) -> None:
@@ -162,20 +177,29 @@ def _export_body(scene: Path, body: str, out: Path, dialect: Literal["wallrapp",
     console.print("wrote", str(out), soft_wrap=True)
 
 
-def _export_program(scene: Path, fmu: Path | None, c: Path | None, inputs: list[str], step: float | None) -> None:
+def _export_program(
+    scene: Path, fmu: Path | None, c: Path | None, page: Path | None, inputs: list[str], step: float | None,
+    target: str | None, sliders: list[str],
+) -> None:  # fmt: skip
+    from flexmb.export.emitted import LEVEL
+    from flexmb.export.web import export_page
     from flexmb.export.writing import export_c, export_fmu
     from flexmb.scene.files import load_scene
 
+    ranges = dict(map(_slider, sliders)) or None
     loaded = load_scene(scene)
     with console.status(Text(f"compiling {scene}")):
         if fmu is not None:
             check_folder(fmu.parent)
             folder(fmu.parent)
             model = export_fmu(loaded, fmu, inputs=inputs, step=step)
+        elif page is not None:
+            check_folder(page.parent)
+            model = export_page(loaded, page, sliders=ranges, inputs=inputs, step=step)
         else:
-            assert c is not None  # one of the three is given
+            assert c is not None  # one of the four is given
             check_folder(c)
-            model = export_c(loaded, c, inputs=inputs)
+            model = export_c(loaded, c, inputs=inputs, target=target or LEVEL)
     numbers = model.numbers.changeable
     for what, names in (
         ("inputs", [each.candidate.name for each in numbers if each.candidate.is_input]),
@@ -184,7 +208,19 @@ def _export_program(scene: Path, fmu: Path | None, c: Path | None, inputs: list[
         console.print(printable(f"{what}: {', '.join(names) or 'none'}"), soft_wrap=True)
     _tell(tuple(f"{name} is fixed: {why}" for name, why in model.numbers.fixed.items()))
     _tell((model.open_loads,) if model.open_loads else ())
-    console.print("wrote", str(fmu or c), soft_wrap=True)
+    console.print("wrote", str(fmu or c or page), soft_wrap=True)
+
+
+def _slider(text: str) -> tuple[str, tuple[float, float] | None]:
+    """Name and range of NAME or NAME=LOW,HIGH."""
+    name, given, between = text.partition("=")
+    if not given:
+        return name, None
+    try:
+        low, high = map(float, between.split(","))
+    except ValueError:
+        raise ValueError(f'--slider "{text}": give NAME or NAME=LOW,HIGH, two numbers') from None
+    return name, (low, high)
 
 
 def reduce(

@@ -11,7 +11,7 @@ import numpy as np
 
 from flexmb.closure.tables import Closed
 from flexmb.export import entry
-from flexmb.export.emitted import emitted
+from flexmb.export.emitted import LEVEL, emitted
 from flexmb.export.image import ROW, Image, flattened, image, number_of
 from flexmb.export.numbers import Numbers, numbers, with_inputs
 from flexmb.export.refusals import refuse
@@ -83,14 +83,15 @@ class ExportedModel(NamedTuple):
         return next(output.word for output in self.outputs if output.name == name)
 
 
-def model(scene: Scene, inputs: Sequence[str] = ()) -> ExportedModel:
+def model(scene: Scene, inputs: Sequence[str] = (), target: str = LEVEL) -> ExportedModel:
     """The model of a scene; inputs: paths of loads, motors and actuators that are inputs instead of what they are.
 
-    Constant loads, motors and actuators are inputs, too. NotExportable for what is not exported, before anything is
-    compiled; SceneError for a scene that is wrong, PathError for an input that is not there.
+    Constant loads, motors and actuators are inputs, too. target: one of `emitted.TARGETS`. NotExportable for what is
+    not exported, before anything is compiled; SceneError for a scene that is wrong, PathError for an input that is not
+    there, ValueError for another target.
     """
     prepared, kinds = tabled(scene, inputs)
-    return prepared._replace(code=_code(prepared.identifier, kinds))
+    return prepared._replace(code=_code(prepared.identifier, kinds, target))
 
 
 def tabled(scene: Scene, inputs: Sequence[str] = ()) -> tuple[ExportedModel, tuple[Any, Any, Any]]:
@@ -182,7 +183,7 @@ def _without_doubt(block: Image, constants: Any, number: int) -> Image:
     return Image(words, block.stored, block.addresses, block.bundles, block.arrays)
 
 
-def _code(identifier: str, kinds: tuple[Any, Any, Any]) -> bytes:
+def _code(identifier: str, kinds: tuple[Any, Any, Any], target: str) -> bytes:
     (c, w, out), state = kinds, (REAL, WHOLE, WHOLE, WHOLE)
     rates, outputs, settle = entry.rates, entry.outputs, entry.settle
     if c.of is Closed:
@@ -191,7 +192,7 @@ def _code(identifier: str, kinds: tuple[Any, Any, Any]) -> bytes:
         f"{identifier}_kernel_rates": (rates, (*state, c, w)),
         f"{identifier}_kernel_outputs": (outputs, (REAL, WHOLE, WHOLE, c, w, out)),
         f"{identifier}_kernel_settle": (settle, (REAL, WHOLE, WHOLE, c)),
-    })  # fmt: skip
+    }, target)  # fmt: skip
 
 
 def _outputs(system: System, out: Any, block: Image, loads: bool) -> Iterator[Output]:

@@ -44,6 +44,11 @@ def example(model: ExportedModel) -> str:
     return _shared("main.c", model)
 
 
+def browser(model: ExportedModel) -> str:
+    """The functions of a page of the web, to be appended to `core`."""
+    return _shared("page.c", model)
+
+
 def _shared(file: str, model: ExportedModel) -> str:
     text = files("flexmb.export").joinpath("c", file).read_text(encoding="utf-8")
     return text.replace("MODEL", model.identifier)

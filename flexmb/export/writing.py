@@ -12,6 +12,7 @@ from math import inf
 from pathlib import Path
 
 from flexmb.export.description import LICENSE, description
+from flexmb.export.emitted import LEVEL
 from flexmb.export.model import ExportedModel, model
 from flexmb.export.refusals import NotExportable, c_compiler
 from flexmb.export.sources import core, example, fmi2, header
@@ -46,13 +47,14 @@ def export_fmu(scene: Scene, path: Path, *, inputs: Sequence[str] = (), step: fl
     return made_of
 
 
-def export_c(scene: Scene, folder: Path, *, inputs: Sequence[str] = ()) -> ExportedModel:
-    """Write a scene as C into a folder: a header, its functions, an object file for x86-64 and an example program.
+def export_c(scene: Scene, folder: Path, *, inputs: Sequence[str] = (), target: str = LEVEL) -> ExportedModel:
+    """Write a scene as C into a folder: a header, its functions, an object file and an example program.
 
     The functions allocate nothing; an instance is one struct. Compile with `cc example.c NAME.c NAME_kernels.o -lm`.
-    inputs and errors: as of `export_fmu`; no C compiler is needed for the export itself.
+    target: the processors that the object file is for (`flexmb.export.emitted.TARGETS`), x86-64 by default. inputs and
+    errors: as of `export_fmu`; no C compiler is needed for the export itself. ValueError for another target.
     """
-    made_of = model(scene, inputs)
+    made_of = model(scene, inputs, target)
     write_c(made_of, folder)
     return made_of
 

@@ -13,14 +13,12 @@ int main(int count, char **words) {
     MODEL_init(m);
     int status = MODEL_start(m, 0.0, y);
     if (count > 3 && !strcmp(words[3], "time")) {
-        struct timespec a, b;
-        clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &a);
+        const clock_t begun = clock();
         for (int i = 0; i < 20000; i++) {
             y[0] += 1e-9;
             MODEL_rhs(m, 0.1, y, dy);
         }
-        clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &b);
-        printf("%.1f ns\n", ((double)(b.tv_sec - a.tv_sec) * 1e9 + (double)(b.tv_nsec - a.tv_nsec)) / 20000.0);
+        printf("%.1f ns\n", (double)(clock() - begun) * 1e9 / CLOCKS_PER_SEC / 20000.0);
         return 0;
     }
     if (!status) status = MODEL_run(m, 0.0, end, step, y, &t);
