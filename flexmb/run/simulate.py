@@ -238,7 +238,7 @@ def _looked_at(system: System, made: Made) -> tuple[Trajectory, list[Warning], b
         return trajectory, warned, was_interrupted
     t, q, u = trajectory.t, trajectory.q, trajectory.u
     failed = not trajectory.finished
-    seen = WatchedStates(system, t, q, u, lambda n: system.turns(float(t[n]), q[n], u[n]), failed, trajectory.loads)
+    seen = WatchedStates(system, t, q, u, lambda n: system.turns(float(t[n]), q[n], u[n]), failed, trajectory)
     seen = seen._replace(fastest=np.vstack(fastest)) if fastest and not failed else seen
     for finding in said(seen):
         warned = [*warned, SceneWarning(f'scene "{system.scene.name}": {finding}')]

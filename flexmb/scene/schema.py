@@ -185,8 +185,8 @@ class Scene(SceneStruct, frozen=True, kw_only=True, weakref=True):
     "few_polynomials", at rest or in a motion that bends the beam more than they can follow; "held_stretch", loads that
     would change the length of a beam whose stretch is held by a thousandth.
     For bodies with modes: "level_range", a turn that is fast beside the first frequency, at a level without stiffening;
-    "few_modes", a load on a node of a beam that would move it by a thousandth of its length or 0.003 rad in a family of
-    modes that `count` leaves out.
+    "few_modes", loads on a beam, its own or of what it is joined to, that would move a node by a thousandth of its
+    length or 0.003 rad in a family of modes that `count` leaves out.
     A scene without dimensions, or in other consistent units than SI (mm, tonne, s, N), lists "wave_speed",
     "thick_section", "shear_stiffness" and "modal_frequency".
     """

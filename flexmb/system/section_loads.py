@@ -9,9 +9,9 @@ eigenmode has a shear force at its tip.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, assert_never
+from typing import Any, NamedTuple, Protocol, assert_never
 
 import numpy as np
 
@@ -122,6 +122,25 @@ class SectionLoads:
         return arguments.number("G", G) * arguments.number("r", r) * self.strain[..., 3]
 
 
+class ExertedLoads(Protocol):
+    """What is read here of the loads of a state: see `flexmb.system.observables.Evaluation`."""
+
+    @property
+    def loads(self) -> Mapping[str, Real]: ...
+    @property
+    def wheel_loads(self) -> Mapping[str, Real]: ...
+    @property
+    def connectors(self) -> Mapping[str, Real]: ...
+
+
+class LoadsByName(NamedTuple):
+    """`ExertedLoads` of one state, (6,) each, or of T of them, (T,6)."""
+
+    loads: dict[str, Real]
+    wheel_loads: dict[str, Real]
+    connectors: dict[str, Real]
+
+
 class AllLoads(NamedTuple):
     """All loads on the bodies of a system at time t (s), `exerted`, and a workspace that has their motion.
 
@@ -157,7 +176,6 @@ class SectionBalance:
         self.x = cuts
         self._cuts, self._places = np.unique(cuts, return_inverse=True)
         self._k = arrays.body_names.index(body)
-        self._outboard = np.flatnonzero(arrays.constants.body["parent"] == self._k).tolist()
         self.sections = beam_sections(self._beam, self._cuts)
 
     def at(self, state: AllLoads) -> Real:
@@ -215,7 +233,6 @@ class SectionBalance:
     def _outer(self, w: MotionTables, pose: Pose, exerted: Evaluation) -> list[_Outer]:
         """All loads on the beam, with their places along it."""
         arrays, k, scene = self._arrays, self._k, self._arrays.scene
-        loads, wheels = exerted.loads, exerted.wheel_loads
         constants = arrays.constants
         outer: list[_Outer] = []
 
@@ -225,17 +242,10 @@ class SectionBalance:
             about = torque + cross(point - pose.position, force)
             outer.append(_Outer(beyond, np.concatenate([pose.rotation.T @ about, pose.rotation.T @ force])))
 
-        own = arrays.links[k]
-        load = loads[own.hinge.name]  # a section at the hinge itself transmits its load: the hinge is not beyond
-        add(own.outboard_end.node, load[:3], load[3:], hinge_frames_of(arrays, w, k).point, at=False)
-        for j in self._outboard:
-            link, load = arrays.links[j], loads[arrays.links[j].hinge.name]
-            add(link.inboard_end.node, -load[:3], -load[3:], hinge_frames_of(arrays, w, j).point)
         carrier = link_pose(w, k)
-        rows = range(int(constants.body[k]["wheel_start"]), int(constants.body[k]["wheel_stop"]))
-        for wheel, row in zip((wheel for wheel in scene.wheels if wheel.body == self.body), rows, strict=True):
-            centre = carrier.position + carrier.rotation @ w.port["r"][constants.wheel[row]["port"]]
-            add(wheel.node, -wheels[wheel.name][:3], -wheels[wheel.name][3:], centre)
+        for n, joined in enumerate(joined_loads(arrays, w, k, exerted)):
+            # a section at the beam's own hinge itself, the first of them, transmits its load: the hinge is not beyond
+            add(*joined, at=n > 0)
         rows = range(int(constants.body[k]["load_start"]), int(constants.body[k]["load_stop"]))
         for load_of, row in zip((load for load in scene.loads if load.body == self.body), rows, strict=True):
             table = constants.load[row]
@@ -245,21 +255,45 @@ class SectionBalance:
             point, none = carrier.position + carrier.rotation @ w.port["r"][port], np.zeros(3)
             torque, force = (value, none) if table["type"] == TORQUE else (none, value)
             add(load_of.node, torque, force, point)
-        for i, connector in enumerate(between_nodes(scene)):
-            load, (body_b, port_b) = exerted.connectors[connector.name], constants.end[i][["body", "port"]][1]
-            on = link_pose(w, int(body_b))
-            point = constants.end[i]["position"][1] if body_b < 0 else on.position + on.rotation @ w.port["r"][port_b]
-            for node, body, sign in (
-                (connector.node_a, connector.body_a, -1.0), (connector.node_b, connector.body_b, 1.0),
-            ):  # fmt: skip
-                if body == self.body:
-                    add(node, sign * load[:3], sign * load[3:], point)
-        for i, closure in enumerate(scene.closures):
-            for side, sign in zip(closure_sides(closure), (-1.0, 1.0), strict=True):
-                if side.body == self.body:
-                    load = sign * loads[closure.name]
-                    add(side.node, load[:3], load[3:], closure_frames_of(arrays, w, i).point)
         return outer
+
+
+class JoinedLoad(NamedTuple):
+    """[torque; force] (3,) each on a body at a node, about a point (3,) m, all in World axes."""
+
+    node: str
+    torque: Real
+    force: Real
+    point: Real
+
+
+def joined_loads(arrays: SceneArrays, w: MotionTables, k: int, exerted: ExertedLoads) -> Iterator[JoinedLoad]:
+    """The loads on body k of all that it is joined to: of its own hinge, which is the first, of hinges, point masses
+    and wheels that it carries, of connectors and of closures."""
+    loads, wheels, constants, scene = exerted.loads, exerted.wheel_loads, arrays.constants, arrays.scene
+    own, body = arrays.links[k], arrays.body_names[k]
+    load = loads[own.hinge.name]
+    yield JoinedLoad(own.outboard_end.node, load[:3], load[3:], hinge_frames_of(arrays, w, k).point)
+    for j in np.flatnonzero(constants.body["parent"] == k).tolist():
+        link, load = arrays.links[j], loads[arrays.links[j].hinge.name]
+        yield JoinedLoad(link.inboard_end.node, -load[:3], -load[3:], hinge_frames_of(arrays, w, j).point)
+    carrier = link_pose(w, k)
+    rows = range(int(constants.body[k]["wheel_start"]), int(constants.body[k]["wheel_stop"]))
+    for wheel, row in zip((wheel for wheel in scene.wheels if wheel.body == body), rows, strict=True):
+        centre = carrier.position + carrier.rotation @ w.port["r"][constants.wheel[row]["port"]]
+        yield JoinedLoad(wheel.node, -wheels[wheel.name][:3], -wheels[wheel.name][3:], centre)
+    for i, connector in enumerate(between_nodes(scene)):
+        load, (body_b, port_b) = exerted.connectors[connector.name], constants.end[i][["body", "port"]][1]
+        on = link_pose(w, int(body_b))
+        point = constants.end[i]["position"][1] if body_b < 0 else on.position + on.rotation @ w.port["r"][port_b]
+        for node, end, sign in ((connector.node_a, connector.body_a, -1.0), (connector.node_b, connector.body_b, 1.0)):
+            if end == body:
+                yield JoinedLoad(node, sign * load[:3], sign * load[3:], point)
+    for i, closure in enumerate(scene.closures):
+        for side, sign in zip(closure_sides(closure), (-1.0, 1.0), strict=True):
+            if side.body == body:
+                load = sign * loads[closure.name]
+                yield JoinedLoad(side.node, load[:3], load[3:], closure_frames_of(arrays, w, i).point)
 
 
 class _Motion(NamedTuple):

@@ -9,7 +9,7 @@ loads, which runs, equilibria, spins and linear models have.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -17,6 +17,7 @@ import numpy as np
 from flexmb.scene.bodies import BeamBody
 from flexmb.scene.problems import Doubt, Place, SceneWarning
 from flexmb.scene.schema import Waiver
+from flexmb.system.section_loads import ExertedLoads, LoadsByName
 from flexmb.system.system import System
 from flexmb.tables.state import State
 from flexmb.typing import Real
@@ -29,7 +30,7 @@ class WatchedStates(NamedTuple):
     """States that are looked at: coordinates q (T,nq) and speeds u (T,nu) at t (T,) s.
 
     turns: angular velocities (N,3) rad/s of the bodies in a state, by its number. failed: whether a run ended early,
-    which may have diverged. loads: those (T,6) of hinges and closures, by name, None where they were not asked for.
+    which may have diverged. exerted: loads (T,6) by name, as of a trajectory; None where they were not asked for.
     fastest: further states of a run, at ends of its steps, see `flexmb.run.propagate.Raw`. turned: what the watch of
     levels says, if it has looked at every step while a batch ran.
     """
@@ -40,7 +41,7 @@ class WatchedStates(NamedTuple):
     u: Real
     turns: Callable[[int], Real]
     failed: bool = False
-    loads: Mapping[str, Real] | None = None
+    exerted: ExertedLoads | None = None
     fastest: Real = _NONE
     turned: Sequence[AccuracyFinding] | None = None
 
@@ -118,13 +119,14 @@ def _few_polynomials(seen: WatchedStates) -> Iterator[AccuracyFinding]:
 def _held_stretch(seen: WatchedStates) -> Iterator[AccuracyFinding]:
     from flexmb.system.held_stretch import unstretched  # imported here because few scenes have such beams
 
-    return unstretched(seen.system, seen.t, seen.q, seen.u, seen.loads) if seen.loads is not None else iter(())
+    at = seen.exerted
+    return unstretched(seen.system, seen.t, seen.q, seen.u, at.loads) if at is not None else iter(())
 
 
 def _few_modes(seen: WatchedStates) -> Iterator[AccuracyFinding]:
     from flexmb.system.few_modes import left_out  # imported here because many scenes have no flexible bodies
 
-    return left_out(seen.system, seen.t, seen.q, seen.u)
+    return left_out(seen.system, seen.t, seen.q, seen.u, seen.exerted)
 
 
 class _Watch(NamedTuple):
@@ -206,14 +208,15 @@ def of_states(system: System, states: Sequence[State], turns: Callable[[int], Re
     system if left out. None are looked at where all bodies are rigid."""
     states = () if system.is_rigid else states
     t, q, u = (np.array([getattr(state, key) for state in states]) for key in ("t", "q", "u")) if states else _NOTHING
-    loads = _loads(system, states) if len(system.constants.section) and not system.scene.controllers else None
-    return WatchedStates(system, t, q, u, turns or (lambda n: system.turns(float(t[n]), q[n], u[n])), loads=loads)
+    loads = _exerted(system, states) if len(system.constants.section) and not system.scene.controllers else None
+    return WatchedStates(system, t, q, u, turns or (lambda n: system.turns(float(t[n]), q[n], u[n])), exerted=loads)
 
 
-def _loads(system: System, states: Sequence[State]) -> dict[str, Real]:
-    """Loads (T,6) of hinges and closures, by name."""
-    loads = [system.evaluate(state.t, state.q, state.u).loads for state in states]
-    return {name: np.array([arrays[name] for arrays in loads]) for name in (loads[0] if loads else ())}
+def _exerted(system: System, states: Sequence[State]) -> LoadsByName:
+    """Loads (T,6) in the states."""
+    at = [system.evaluate(state.t, state.q, state.u) for state in states]
+    kinds = [[getattr(each, kind) for each in at] for kind in LoadsByName._fields]
+    return LoadsByName(*({name: np.array([loads[name] for loads in each]) for name in each[0]} for each in kinds))
 
 
 def warn(seen: WatchedStates, stacklevel: int = 3) -> None:

@@ -314,3 +314,48 @@ def test_a_load_in_world_axes_is_looked_at_wherever_the_beam_turns(angle, told_o
                       rotation=fm.AngularCoordinate(prescribed_rad=turn))  # fmt: skip
     answers = told(lambda scene: fm.simulate(scene, 1.0, samples=11, rtol=1e-4), replace(scene, hinges=(hub,)))
     assert any("none of torsion" in answer for answer in answers) is told_of, answers
+
+
+def frame(modes=3, force=2.0, joint="weld", level="full"):
+    """An L in the plane of x and y, whose second side is turned by half the force times 1 m about the axis of the first
+    one, and twists it: across a weld, or through a closure in its place."""
+    quarter = np.sqrt([0.5, 0.0, 0.0, 0.5])
+    builder = fm.SceneBuilder("frame", gravity=(0.0, 0.0, 0.0)).beam(
+        "stem", length=1.0, elements=8, section=FLEX, modes=modes, level=level
+    )
+    builder.weld("clamp", "ground", "stem").rigid_body("arm", mass=1.0, com=(0.25, 0, 0), inertia=(0.01, 0.02, 0.02))
+    if joint == "weld":
+        builder.weld("corner", "stem", "arm", parent_node="tip", parent_quaternion=quarter)
+    else:
+        builder.free("floating", "ground", "arm", position=(1.0, 0.0, 0.0), quaternion=quarter)
+        builder.closure("corner", "weld", "stem", "arm", node_a="tip", quaternion_a=quarter)
+    builder.force("push", "arm", node="origin", direction=(0, 0, -1), function=fm.Constant(value=force))
+    builder.torque("turn", "arm", node="origin", direction=(1, 0, 0), function=fm.Constant(value=-0.5 * force))
+    return builder.marker("tip", "stem", node="tip").scene()
+
+
+def by_batch(scene):
+    return fm.simulate_batch([scene, scene], 0.02, samples=3, rtol=1e-4)
+
+
+@pytest.mark.parametrize("joint", ["weld", "closure"])
+@pytest.mark.parametrize("door", [fm.equilibrium, lambda scene: fm.linearize(scene, fm.equilibrium(fm.compile(scene)))])
+def test_what_a_beam_is_joined_to_would_twist_it(joint, door):
+    """With the closed form T L / GJ = 2 N x 0.5 m x 1 m / 25 N m2, and the remedy has it."""
+    words = told(door, frame(joint=joint))
+    assert any("none of torsion, in which what it is joined to, at t = 0 s, would move its node by up to 0.04 rad" in
+               word for word in words), words  # fmt: skip
+    assert told(door, frame(joint=joint, force=0.14)) == []  # turns it by less than 3e-3
+    assert told(door, replace(frame(joint=joint), allow=("few_modes",))) == []
+    cured = frame(s.Modes(count=3, static=True), joint=joint)
+    assert told(door, cured) == []
+    state, system = fm.equilibrium(cured), fm.compile(cured)
+    tip = system.evaluate(0.0, state.q, state.u).markers["tip"]
+    assert 2.0 * tip.quaternion[1] == pytest.approx(-0.04, rel=1e-3)
+
+
+@pytest.mark.parametrize("door", [lambda scene: fm.simulate(scene, 0.02, samples=3, rtol=1e-4), by_batch])
+def test_runs_tell_of_what_twists_their_beams_in_motion(door):
+    """Across the weld goes what accelerates the arm, too."""
+    assert any("none of torsion, in which what it is joined to" in word for word in told(door, frame(force=20.0)))
+    assert not any("none of torsion" in word for word in told(door, frame(s.Modes(count=3, static=True), force=20.0)))
