@@ -79,7 +79,7 @@ def refuse_unknown_outputs(system: System, names: Sequence[str]) -> None:
 
 def refuse_undetermined(trajectory: Trajectory, names: Sequence[str]) -> None:
     """DynamicsError for channels of a finished run that redundant closures leave undetermined: a scalar of them has no
-    value, and thus no gradient."""
+    value, and thus no gradient, and no measurement tells of it."""
     known = chosen(trajectory, [name for name in names if ".drive[" not in name] or ["work"])
     for name, values in zip(known.names, known.values.T, strict=True):
         if np.any(np.isnan(values)):

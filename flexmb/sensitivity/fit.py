@@ -28,7 +28,7 @@ from flexmb.run.trajectory import Trajectory
 from flexmb.scene.check import check_and_warn
 from flexmb.scene.problems import SceneError, SceneWarning, closest
 from flexmb.scene.schema import Scene
-from flexmb.sensitivity.channels import Chosen, chosen, refuse_unknown_outputs
+from flexmb.sensitivity.channels import Chosen, chosen, refuse_undetermined, refuse_unknown_outputs
 from flexmb.sensitivity.gate import Admitted, admitted_to, again, prepared
 from flexmb.sensitivity.measurements import Measurements, measurements
 from flexmb.sensitivity.sensitivities import of_run
@@ -193,8 +193,8 @@ def fit(
     standard deviation of the noise, of all channels or by channel; None: estimated from the residuals. settings: of
     the runs, see `simulate`; their tolerances should lie well below the noise.
 
-    Raises ValueError or TypeError for data, bounds, sigmas or `max_runs` that do not fit, and what `sensitivities`
-    raises.
+    Raises ValueError or TypeError for data, bounds, sigmas or `max_runs` that do not fit, DynamicsError for channels
+    that redundant closures leave undetermined, and what `sensitivities` raises.
     """
     max_runs = arguments.count("max_runs", max_runs)
     found, given = numbers(scene, parameters), measurements(data)
@@ -211,6 +211,7 @@ def fit(
     _refuse_unknown_channels(first.trajectory, given.channels)
     _refuse_unfinished(first.trajectory)
     refuse_unknown_outputs(first.system, given.channels)
+    refuse_undetermined(first.trajectory, given.channels)
     noise = _given_noise(sigma, given.channels)
     return _searched(problem, start, limits, noise, max_runs)
 

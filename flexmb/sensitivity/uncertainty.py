@@ -48,15 +48,18 @@ class Uncertainties:
 
     @property
     def shares(self) -> Real:
-        """(T,K,P) contributions relative to the variance; 0 where that is zero."""
+        """(T,K,P) contributions relative to the variance; 0 where that is zero, NaN where it is not determined."""
         variance = self.sigma[..., None] ** 2
-        return np.divide(self.contributions, variance, out=np.zeros_like(self.contributions), where=variance > 0.0)
+        return np.divide(self.contributions, variance, out=np.zeros_like(self.contributions), where=variance != 0.0)
 
     def __str__(self) -> str:
         """For each output its largest standard deviation, and the shares of the parameters in it."""
         lines = []
         for k, output in enumerate(self.outputs):
-            i = int(np.argmax(self.sigma[:, k]))
+            if np.all(np.isnan(self.sigma[:, k])):
+                lines.append(f"{output}: not determined by the motion, because closures are redundant")
+                continue
+            i = int(np.nanargmax(self.sigma[:, k]))
             lines.append(f"{output}: sigma at most {self.sigma[i, k]:.3g} {self.units[k]}, at t = {self.t[i]:g} s")
             order = np.argsort(-self.contributions[i, k])
             shares = self.shares[i, k]

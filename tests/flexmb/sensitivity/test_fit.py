@@ -12,6 +12,7 @@ import flexmb as fm
 from flexmb.ready import scenes
 from flexmb.scene.shapes import beam_section, cuboid_inertia
 from flexmb.sensitivity.measurements import measurements
+from tests.flexmb.closure import mechanisms
 
 LOOSE = {"rtol": 1e-8, "atol": 1e-10}  # far below the noise
 CHANNELS = ("tip.acceleration.y", "attitude.rotation")
@@ -153,3 +154,13 @@ def test_the_number_of_runs_is_a_whole_number(runs):
     data = {"t": [0.0, 0.1, 0.2], "pivot.rotation": [0.0, 0.0, 0.0]}
     with pytest.raises(TypeError, match="max_runs is .*: give a whole number"):
         fm.fit(scenes.pendulum().scene(), data, ["bob.mass_kg"], max_runs=runs)
+
+
+def test_measurements_of_what_the_motion_leaves_open_are_refused_by_name():
+    """Of the loop's own two loads; SciPy said "Residuals are not finite in the initial point"."""
+    scene, t = mechanisms.four_bar(), [0.0, 0.005, 0.01]
+    by = [f"{scene.bodies[0].name}.mass_kg"]
+    with pytest.raises(fm.DynamicsError, match='"loop.force.z" is not determined .*: take other outputs'):
+        fm.fit(scene, {"t": t, "loop.force.z": [1.0, 1.0, 1.0]}, by)
+    told = [values for name, _, values in fm.simulate(scene, 0.01, samples=t).columns() if name == "loop.force.x"]
+    assert fm.fit(scene, {"t": t, "loop.force.x": told[0]}, by).values[0] == pytest.approx(scene.bodies[0].mass_kg)

@@ -7,6 +7,7 @@ import pytest
 
 import flexmb as fm
 from flexmb.ready import scenes
+from tests.flexmb.closure import mechanisms
 
 OUTPUTS = ["pivot.rotation", "pivot.torque.z"]
 SIGMA = {"bob.mass_kg": 0.01, "pivot.rotation.stiffness_Nm_rad": 0.3, "pivot.rotation.angle_rad": 0.005}
@@ -68,3 +69,15 @@ def test_a_fit_brings_its_covariance():
 def test_bad_input_is_refused(given, correlation, message):
     with pytest.raises(ValueError, match=message):
         fm.uncertainty(swinging(), 1.0, given, OUTPUTS, correlation=correlation)
+
+
+def test_what_the_motion_leaves_open_has_no_share_and_is_said():
+    """The load out of the plane of a loop of four hinges, beside one that is determined."""
+    scene = mechanisms.four_bar()
+    by = f"{scene.bodies[0].name}.mass_kg"
+    found = fm.uncertainty(scene, 0.01, {by: 0.1}, ["loop.force.z", "loop.force.x"], samples=3)
+    assert np.all(np.isnan(found.shares[:, 0])) and np.all(np.isnan(found.sigma[:, 0]))
+    assert found.shares[-1, 1, 0] == pytest.approx(1.0)
+    first, second, share = str(found).splitlines()
+    assert first == "loop.force.z: not determined by the motion, because closures are redundant"
+    assert second.startswith("loop.force.x: sigma at most") and share.endswith("100.0 %")
