@@ -31,12 +31,11 @@ from flexmb.interchange.imported import (
     usable,
 )
 from flexmb.scene.build import SceneBuilder
-from flexmb.scene.check.inertia import PRINTED
 from flexmb.scene.collecting import Placement
 from flexmb.scene.problems import Defect, SceneError, closest
 from flexmb.scene.quaternions import about, quaternion_of
 from flexmb.scene.reading import Unreadable, read_text
-from flexmb.scene.rounding import ROUNDING
+from flexmb.scene.rounding import PRINTED, ROUNDING
 from flexmb.scene.tree import GROUND
 from flexmb.typing import Real
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from flexmb.modal.beam import BeamElements
 from flexmb.modal.stations import Lump, Stations
+from flexmb.scene.rounding import PRINTED, tensor_dust
 from flexmb.typing import Real
 
 
@@ -99,14 +100,14 @@ def massy_lump(elements: BeamElements, columns: Real, lump: Lump) -> Points:
     """A lump as six equal point masses on its principal axes, at +-sqrt(3 s_k / mass) from the mass centre.
 
     s_k are the eigenvalues of the second-moment tensor S = tr(J)/2 - J: mass, mass centre and inertia are exact. A lump
-    without inertia is one point mass. Raises ValueError if S has a negative eigenvalue beyond rounding.
+    without inertia is one point mass. Raises ValueError if S has a negative eigenvalue beyond what checks allow.
     """
     moved = elements.motion(np.array([lump.x]), columns)
-    if not np.any(lump.inertia):
+    largest, dust = np.max(np.abs(lump.inertia)), tensor_dust(lump.mass, float(elements.mesh.nodes[-1]))
+    if largest <= dust:
         return _massy(moved, np.array([lump.x]), lump.com[None], np.array([lump.mass]))
     second_moment, axes = np.linalg.eigh(np.trace(lump.inertia) / 2.0 * np.eye(3) - lump.inertia)
-    floor = -8.0 * np.finfo(float).eps * np.trace(lump.inertia)  # a flat lump has a zero eigenvalue, up to rounding
-    if second_moment.min() < floor:
+    if second_moment.min() < -(PRINTED * largest + dust):  # a flat lump has a zero eigenvalue, up to rounding
         raise ValueError(
             f"tip mass at x = {lump.x:g} m: impossible inertia (principal moments break the triangle inequality); "
             "check inertia_kg_m2"

@@ -11,7 +11,7 @@ from flexmb.scene.check.numbers import in_range
 from flexmb.scene.check.sections import stations
 from flexmb.scene.check.walk import sound
 from flexmb.scene.problems import Defect, Doubt, Place
-from flexmb.scene.rounding import ROUNDING
+from flexmb.scene.rounding import tensor_dust
 from flexmb.scene.schema import Scene
 from flexmb.scene.sections import twists_with_inertia
 from flexmb.scene.sizes import MOST_BYTES, PER_MODE, PLENTY, beam_estimate, counted
@@ -71,7 +71,7 @@ def _along(place: Place, body: BeamBody) -> Iterator[Defect]:
                 what = f"x_m = {item.x_m:g} m is not on the beam"
                 yield Defect(str(place.key(key, i, "x_m")), what, f"choose 0 <= x_m <= {body.length_m:g}")
     for i, lump in enumerate(body.tip_masses):
-        dust = ROUNDING * abs(lump.mass_kg) * body.length_m**2
+        dust = tensor_dust(lump.mass_kg, body.length_m)
         yield from inertia.tensor(place.key("tip_masses", i, "inertia_kg_m2"), lump.inertia_kg_m2, dust)
 
 

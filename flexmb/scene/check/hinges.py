@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from flexmb.scene.check import inertia
 from flexmb.scene.check.numbers import UNIT_LENGTH, in_range
 from flexmb.scene.check.profiles import MOTIONS, initial_motion
 from flexmb.scene.check.walk import sound
@@ -19,6 +18,7 @@ from flexmb.scene.events import Release
 from flexmb.scene.freedoms import Coordinate
 from flexmb.scene.hinges import WITH_AXIS, Z_AXIS, Gimbal
 from flexmb.scene.problems import Defect, Place
+from flexmb.scene.rounding import PRINTED
 from flexmb.scene.schema import Coupling, Scene, Wheel
 from flexmb.scene.tree import Coupled, coordinates, coupled
 
@@ -123,7 +123,7 @@ def _gimbal(place: Place, hinge: Gimbal) -> Iterator[Defect]:
 
 def _wheel_inertia(place: Place, wheel: Wheel) -> Iterator[Defect]:
     axial, transverse = wheel.axial_inertia_kg_m2, wheel.transverse_inertia_kg_m2
-    if in_range(wheel) and axial > 2.0 * transverse * (1.0 + inertia.PRINTED):
+    if in_range(wheel) and axial > 2.0 * transverse * (1.0 + PRINTED):
         what = f"the axial inertia {axial:g} exceeds twice the transverse inertia {transverse:g} kg m²"
         remedy = f"no wheel has this: the transverse inertia is {axial / 2.0:g} kg m² at least (a flat disc)"
         yield Defect(str(place.key("transverse_inertia_kg_m2")), what, remedy)

@@ -12,7 +12,7 @@ from flexmb.scene.check.walk import sound
 from flexmb.scene.columns import column
 from flexmb.scene.problems import Defect, Place
 from flexmb.scene.quantities import LARGEST
-from flexmb.scene.rounding import ROUNDING
+from flexmb.scene.rounding import PRINTED, tensor_dust
 from flexmb.scene.schema import Scene
 from flexmb.scene.tree import GROUND
 from flexmb.typing import Real
@@ -35,10 +35,6 @@ def _arms(scene: Scene) -> Iterator[Real]:
     yield column([hinge for hinge in scene.hinges if hinge.parent != GROUND], "parent_position_m", 3)
 
 
-# Tensors printed to ten digits fulfil symmetry and the triangle inequality (an equality for a flat body) this well.
-PRINTED = 1e-9
-
-
 def rigid_bodies(scene: Scene) -> Iterator[Defect]:
     """Every rigid body has an inertia tensor that a distribution of its mass can have."""
     rigid = {i: body for i, body in enumerate(scene.bodies) if isinstance(body, RigidBody)}
@@ -46,7 +42,7 @@ def rigid_bodies(scene: Scene) -> Iterator[Defect]:
     size = reach(scene) if any(doubtful) else 0.0
     whole = sum(body.mass_kg for body in rigid.values() if body.mass_kg > 0.0)
     for place, body in sound(scene, "bodies", [i for i, doubt in zip(rigid, doubtful, strict=True) if doubt]):
-        dust = ROUNDING * size**2 * (body.mass_kg if body.mass_kg > 0.0 else whole)
+        dust = tensor_dust(body.mass_kg if body.mass_kg > 0.0 else whole, size)
         yield from tensor(place.key("inertia_kg_m2"), body.inertia_kg_m2, dust)
         if body.mass_kg == 0.0 and np.max(np.abs(body.inertia_kg_m2)) > dust:
             what = "a body without mass cannot have inertia"

@@ -19,7 +19,7 @@ from flexmb.scene.check.walk import entries, sound
 from flexmb.scene.modal_data import ModalArrays, modal_arrays, node_arrays
 from flexmb.scene.problems import Defect, Doubt, Place
 from flexmb.scene.quantities import LARGEST
-from flexmb.scene.rounding import ROUNDING
+from flexmb.scene.rounding import PRINTED, ROUNDING, tensor_dust
 from flexmb.scene.schema import Scene
 from flexmb.scene.sizes import MOST_BYTES, modes_memory
 from flexmb.typing import Real
@@ -68,7 +68,6 @@ def _largest(*shapes: ArrayLike) -> float:
     return max(float(np.max(np.abs(shape), initial=0.0)) for shape in shapes)
 
 
-PRINTED = 1e-9  # tolerance of matrices and modes printed to ten digits, relative to the largest element
 # Lowest frequency times size (m/s). The upper limit is the wave speed in the stiffest materials, which no body's first
 # mode reaches; the lower limit is a membrane of a kilometre at a microhertz.
 SPEED = (1e-3, 20_000.0)
@@ -154,7 +153,7 @@ def _points(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Defe
         if body.file is not None and mass < 0.0:  # of points in the scene, `numbers` sees it
             yield Defect(str(point), f"negative mass: {mass:g} kg", "give a mass of at least zero")
         if np.any(tensor):
-            yield from inertia.tensor(point, tensor, ROUNDING * abs(mass) * size**2)
+            yield from inertia.tensor(point, tensor, tensor_dust(mass, size))
     if not np.any(arrays.mass > 0.0):
         yield Defect(str(spot), "the body has no mass", "give its points mass")
 

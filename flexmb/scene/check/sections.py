@@ -8,9 +8,9 @@ from math import sqrt
 import numpy as np
 
 from flexmb.scene.bodies import BeamBody, BeamStation, Matrix6
-from flexmb.scene.check.inertia import PRINTED
 from flexmb.scene.check.numbers import in_range
 from flexmb.scene.problems import Defect, Doubt, Place
+from flexmb.scene.rounding import PRINTED
 from flexmb.scene.sections import (
     INERTIA_KEYS,
     SHEAR_KEYS,

@@ -13,6 +13,7 @@ from flexmb.scene.bodies import BeamBody
 from flexmb.scene.check import SceneError, check_scene
 from flexmb.scene.convert import plain, to_struct
 from flexmb.scene.files import load_scene
+from flexmb.scene.shapes import beam_section
 from tests.flexmb.scene.bad_scenes import BAD, DOUBTFUL, ORPHANING, satellite
 
 ROOT = Path(__file__).parents[3]
@@ -149,3 +150,27 @@ def test_a_place_that_rounding_put_beside_an_end_of_a_beam_is_that_end():
     assert to_struct(data, BeamBody).nodes[0].x_m == 0.3 + 1e-12
     data["length_m"] = float("inf")  # is refused by checks, and no place is near its ends
     assert to_struct(data, BeamBody).nodes[0].x_m == 0.3 + 1e-12
+
+
+@pytest.mark.parametrize("points", ["section", "rotary", "line"])
+@pytest.mark.parametrize("level", ["ruthless", "full", "stiffened", "exact"])
+def test_a_mass_on_a_beam_may_have_dust_in_its_tensor_or_be_flat_to_ten_digits(points, level):
+    """Of 1e-16 of its mass and the beam's length, or J1 + J2 = J3 as it is printed; what is neither is refused."""
+
+    def scene(tensor):
+        section = beam_section(E=7e10, G=2.7e10, A=1e-4, Iy=8e-10, Iz=8e-10, rho=2700)
+        mass = fm.TipMass(x_m=2.0, mass_kg=0.5, inertia_kg_m2=plain(np.asarray(tensor)))
+        builder = fm.SceneBuilder("lump").beam(
+            "rod", length=2.0, elements=4, section=section, modes=3, level=level, points=points, tip_masses=(mass,)
+        )
+        return builder.weld("clamp", "ground", "rod").scene()
+
+    rng = np.random.default_rng(3)
+    for _ in range(4):
+        dust = 1e-16 * 0.5 * 2.0**2 * rng.uniform(-1.0, 1.0, (3, 3))
+        assert check_scene(scene(dust + dust.T)) == () == fm.check_scene(scene(dust + dust.T))
+        still, dusty = (fm.compile(scene(each)) for each in (np.zeros((3, 3)), dust + dust.T))
+        assert np.allclose(dusty.mass_matrix(dusty.initial_state), still.mass_matrix(still.initial_state), atol=1e-10)
+    assert fm.check_scene(scene(np.diag([1.0 / 3.0, 1.0 / 3.0, 0.6666666667]))) == ()
+    with pytest.raises(SceneError, match="triangle inequality"):
+        scene(np.diag([1.0 / 3.0, 1.0 / 3.0, 0.66667]))
