@@ -61,6 +61,15 @@ def balanced(equations: Equations, guess: State) -> RestForces:
     return equilibrium.at
 
 
+def corrected(equations: Equations, at: RestForces) -> State:
+    """The state that the next correction of an equilibrium leads to.
+
+    `balanced` ends where it is below `CONVERGED`, and leaves it. It is of second order in what was left before, and
+    brings the state to the rounding of its forces.
+    """
+    return equations.moved(at, _Linearised(at).step)
+
+
 def _relaxed(equations: Equations, start: State) -> RestForces:
     """Overdamped motion, M xi' = load, by implicit steps tau that grow as they succeed, then Newton's method.
 

@@ -18,6 +18,8 @@ from crosscheck.running import starts
 from crosscheck.running.plan import plan, variant_scene
 from crosscheck.running.starts import at_rest
 from crosscheck.running.undetermined import undetermined
+from flexmb.linear.equations import equations_of
+from flexmb.linear.newton import corrected
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder, linear
 from flexmb.scene.files import load_scene
@@ -78,6 +80,22 @@ def test_a_body_that_falls_has_no_equilibrium() -> None:
     tree = SceneBuilder("falling", gravity=(0.0, 0.0, -9.81)).rigid_body("body", mass=1.0, inertia=(0.1, 0.1, 0.1))
     with pytest.raises(ValueError, match="equilibrium"):
         at_rest(tree.free("flight", "ground", "body").marker("body", "body").scene())
+
+
+def test_a_start_at_rest_is_there_to_rounding() -> None:
+    """Newton's method ends where its next correction is below 1e-12, which is more than the references are known to."""
+    case = load_case(shipped_folder() / "linearised" / "sagging_arm")
+    scene = case.scene(case.run.variants[0])
+
+    def left(start: flexmb.State) -> float:
+        """The correction (rad, m) that Newton's method would make."""
+        held = equations_of(system).held(0.0)
+        there = corrected(held, held.forces(start))
+        return float(np.abs(there.q - start.q).max())
+
+    system = flexmb.compile(at_rest(scene))
+    assert left(system.initial_state) < 1e-16
+    assert left(flexmb.equilibrium(scene)) > 1e-15
 
 
 def test_a_variant_in_its_equilibrium_is_another_model_and_a_fault_has_its_own() -> None:
