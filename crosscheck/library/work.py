@@ -5,7 +5,8 @@ In reference.toml a line for each effort of each engine that made the numbers::
     [work]
     "native (rigid), dop853 rtol=1e-12" = { evaluations = 8147, steps = 601, operations = 6372421 }
 
-A count that the engine does not make is left out. A later run has the same work if each count is within `ALIKE` of the
+A count that the engine does not make is left out, and so are all counts of a run in which nothing moves: how many steps
+that takes is decided by rounding. A later run has the same work if each count is within `ALIKE` of the
 stored one: other processors round otherwise, so that a few steps more or less are accepted or refused.
 """
 

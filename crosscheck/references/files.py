@@ -19,6 +19,7 @@ from flexmb.output.files import whole_file, write_whole
 from flexmb.run.channels import distance, unit
 
 HEADER = "Written by `crosscheck regenerate`, with reference.csv; nobody edits it. docs/references.md explains it."
+NO_WORK = "No table [work]: no run behind these numbers has a motion whose steps an engine counts."
 
 
 def knowledge_text(knowledge: Knowledge) -> str:
@@ -30,21 +31,23 @@ def knowledge_text(knowledge: Knowledge) -> str:
             rows = tomlkit.array()
             rows.extend(value)
             document[key] = rows.multiline(True)
-        elif key == "work":
+        elif key == "work" and value:
             document.update(_work_table(value))
+        elif key == "work":
+            document.add(tomlkit.comment(NO_WORK))
         else:
             document[key] = value
     return tomlkit.dumps(document)
 
 
 def _work_table(work: dict[str, dict[str, int]]) -> dict[str, Table]:
-    """The table [work], a line for each run; none if nothing was counted."""
+    """The table [work], a line for each run."""
     table = tomlkit.table()
     for run, counts in work.items():
         line = tomlkit.inline_table()
         line.update(counts)
         table[run] = line
-    return {"work": table} if work else {}
+    return {"work": table}
 
 
 def write_both(folder: Path, values: str, knowledge: str) -> None:

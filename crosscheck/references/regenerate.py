@@ -130,6 +130,8 @@ def _changed(before: Knowledge, now: Knowledge) -> list[str]:
     found = [f"{PROVENANCE} was changed since"] if before.provenance != now.provenance else []
     if now.work.keys() - before.work.keys():
         return [*found, "the work of its runs was not counted"]
+    if gone := before.work.keys() - now.work.keys():
+        return [*found, f"the work of {len(gone)} runs is not counted any more"]
     for run, then in before.work.items():
         for count, old, new in changes(then, now.work.get(run, then)):
             found.append(f"{run} took {old} {count}, now {new}")

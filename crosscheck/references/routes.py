@@ -162,7 +162,7 @@ def _of_engine(case: Case, route: ReferenceRoute, variant: str, result: Result) 
         work={
             key(result.engine, variant, run.effort): Counts(run.evaluations, run.steps, run.operations)
             for run in result.runs
-            if run.evaluations or run.steps or run.operations
+            if (run.evaluations or run.steps or run.operations) and not result.rests  # there rounding decides on steps
         },
     )
 

@@ -7,7 +7,8 @@ import pytest
 from crosscheck.library.basis import WITNESS, Basis, basis, contradiction
 from crosscheck.library.case import ReferenceKind
 from crosscheck.library.find import Case
-from crosscheck.library.reference import load_reference
+from crosscheck.library.reference import KNOWLEDGE, load_reference
+from crosscheck.references.files import NO_WORK
 from tests.crosscheck.sessions import shipped
 
 CASES = [case for case in shipped() if case.provenance is not None]
@@ -38,6 +39,23 @@ def test_as_many_codes_are_stored_as_are_spoken_of(case: Case) -> None:
 def test_few_references_rest_on_native_alone() -> None:
     alone = [case.name for case in CASES if stored(case).alone]
     assert len(alone) <= ON_NATIVE_ALONE, alone
+
+
+RESTING = {f"linearised/{name}" for name in
+           ("bend_twist", "cantilever", "hanging_pendulum", "sagging_arm", "spring_chains")}  # fmt: skip
+
+
+def test_every_reference_of_a_motion_counts_the_work_of_each_effort_and_the_others_say_why_not() -> None:
+    """That a run which rests has no counts, though its engine makes some, is tested in test_regenerate.py."""
+    known = {case.name: load_reference(case.folder).knowledge for case in CASES}
+    assert {name for name, each in known.items() if not each.work} == RESTING
+    for case in CASES:
+        assert (NO_WORK in (case.folder / KNOWLEDGE).read_text(encoding="utf-8")) == (case.name in RESTING)
+        for route in known[case.name].routes if case.name not in RESTING else ():
+            name, *efforts = (part for part in route.split(", ") if part != WITNESS)
+            if not name.endswith(".py"):
+                counted = {run.partition(" (")[0] + run.rpartition(")")[2] for run in known[case.name].work}
+                assert {f"{name}, {effort}" for effort in efforts} <= counted, case.name
 
 
 NATIVE = ("native, dop853 rtol=1e-11", "native-composite, rk4 h=0.001")

@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from crosscheck.judging.results import Result
 from crosscheck.library.case import CaseError
 from crosscheck.library.find import load_case
 from crosscheck.library.reference import KNOWLEDGE, VALUES, current_reference, load_reference
+from crosscheck.references.files import NO_WORK
 from crosscheck.references.regenerate import Regenerated
 from crosscheck.references.regenerate import regenerate as make_again
 from crosscheck.running.pool import run_jobs
@@ -151,6 +153,18 @@ def test_a_reference_without_counts_gets_them_and_keeps_its_values(copied: Path)
     assert "was not counted" in regenerate(copied).remark
     assert load_reference(copied).knowledge == before
     assert (copied / VALUES).read_bytes() == values
+
+
+def test_runs_in_which_nothing_moves_have_no_counts_and_the_file_says_so(
+    copied: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert NO_WORK not in (copied / KNOWLEDGE).read_text(encoding="utf-8")
+    monkeypatch.setattr(Result, "rests", True)
+    count = len(load_reference(copied).knowledge.work)
+    assert f"the work of {count} runs is not counted any more" in regenerate(copied).remark
+    assert not load_reference(copied).knowledge.work
+    assert NO_WORK in (copied / KNOWLEDGE).read_text(encoding="utf-8")
+    assert regenerate(copied).done == "confirmed"
 
 
 def test_check_writes_nothing_and_workers_do_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
