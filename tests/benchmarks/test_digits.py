@@ -7,9 +7,9 @@ from msgspec.structs import replace
 import flexmb as fm
 from flexmb.scene.schema import BeamBody
 from tests.benchmarks import exact_scenes as scenes
-from tests.benchmarks.digits.__main__ import ahead
+from tests.benchmarks.digits.__main__ import PAGE, START, ahead, kept, table
 from tests.benchmarks.digits.problem import Point, front
-from tests.benchmarks.digits.problems import EXACT, PIECES, problems
+from tests.benchmarks.digits.problems import CABLES, EXACT, PIECES, problems
 from tests.benchmarks.digits.shooting import tip
 
 
@@ -30,6 +30,22 @@ def test_the_princeton_beam_is_at_one_place_by_shooting_and_by_level_exact() -> 
     assert np.linalg.norm(tip(beam, force) - princeton.true_paths[0, 0]) < 1e-11
     stiffer = tuple(replace(station, GJ_Nm2=1.01 * station.GJ_Nm2) for station in beam.stations)
     assert np.linalg.norm(tip(replace(beam, stations=stiffer), force) - princeton.true_paths[0, 0]) > 1e-6
+
+
+def test_the_record_has_every_family_and_the_page_has_the_record() -> None:
+    """Exudyn's cables are named apart from its exact elements; the Princeton beam is within 1e-6 m below 10 ms."""
+    asked, record = problems(), kept()
+    assert {problem.name: set(problem.families) for problem in asked} == {name: set(of) for name, of in record.items()}
+    assert {name for name, of in record.items() if CABLES in of} == {
+        "roll_up", "elastica_at_rest", "elastica", "spun", "pendulum",
+    }  # fmt: skip
+    text = PAGE.read_text(encoding="utf-8")
+    assert START + table(asked, record) in text
+    del record["elastica"][CABLES][0]
+    assert START + table(asked, record) not in text
+    (princeton,) = [problem for problem in asked if problem.name == "princeton"]
+    near = [point for point in record["princeton"][EXACT] if princeton.length_m * point.error < 1e-6]
+    assert min(point.seconds for point in near) < 0.010
 
 
 def test_ratios_are_at_equal_error() -> None:

@@ -24,7 +24,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator
 
 from tests.benchmarks.digits.problem import Point, Problem, front
-from tests.benchmarks.digits.problems import ELEMENTS, EXACT, KRATOS, PIECES, RODS, problems
+from tests.benchmarks.digits.problems import CABLES, ELEMENTS, EXACT, KRATOS, PIECES, RODS, problems
 from tests.repo.project import ROOT
 
 PICTURE = ROOT / "docs" / "pictures" / "large_deflection_cost.svg"
@@ -34,7 +34,10 @@ START, END = "<!-- ahead: written by python -m tests.benchmarks.digits --draw --
 COLUMNS = 4
 PASSES = 2
 OURS = (EXACT, PIECES)
-STYLES = {EXACT: ("C0", "o"), PIECES: ("C1", "s"), ELEMENTS: ("C2", "^"), KRATOS: ("C3", "v"), RODS: ("C4", "D")}
+STYLES = {
+    EXACT: ("C0", "o"), PIECES: ("C1", "s"), CABLES: ("C2", "^"), ELEMENTS: ("C5", "<"), KRATOS: ("C3", "v"),
+    RODS: ("C4", "D"),
+}  # fmt: skip
 
 Fronts = dict[str, dict[str, list[Point]]]
 
@@ -42,25 +45,25 @@ Fronts = dict[str, dict[str, list[Point]]]
 def main(names: list[str]) -> None:
     """Run the named problems, or all of them, keep what came out, and draw."""
     asked = problems()
-    kept = _kept()
+    record = kept()
     for problem in asked:
         if "--draw" not in names and (not names or problem.name in names):
             print(problem.title, file=sys.stderr, flush=True)
             found = {family: list[Point]() for family in problem.families}
             for family in [*problem.families] * PASSES:
                 found[family] += problem.points(family)
-            kept[problem.name] = {family: front(points) for family, points in found.items()}
-            _print(problem, kept[problem.name])
-            RESULTS.write_bytes(msgspec.json.format(msgspec.json.encode(kept)) + b"\n")
-    there = [problem for problem in asked if problem.name in kept]
-    draw(there, kept)
+            record[problem.name] = {family: front(points) for family, points in found.items()}
+            _print(problem, record[problem.name])
+            RESULTS.write_bytes(msgspec.json.format(msgspec.json.encode(record)) + b"\n")
+    there = [problem for problem in asked if problem.name in record]
+    draw(there, record)
     before, _, rest = PAGE.read_text(encoding="utf-8").partition(START)
-    PAGE.write_text(before + START + table(there, kept) + END + rest.partition(END)[2], encoding="utf-8")
+    PAGE.write_text(before + START + table(there, record) + END + rest.partition(END)[2], encoding="utf-8")
 
 
-def _kept() -> Fronts:
-    kept = msgspec.json.decode(RESULTS.read_bytes(), type=Fronts) if RESULTS.exists() else {}
-    return {name: {family: front(points) for family, points in found.items()} for name, found in kept.items()}
+def kept() -> Fronts:
+    found = msgspec.json.decode(RESULTS.read_bytes(), type=Fronts) if RESULTS.exists() else {}
+    return {name: {family: front(points) for family, points in of.items()} for name, of in found.items()}
 
 
 def table(asked: list[Problem], kept: Fronts) -> str:
