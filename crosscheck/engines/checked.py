@@ -7,10 +7,13 @@ from dataclasses import dataclass, field, replace
 from crosscheck.engines.answers import checked_ladder, checked_model, checked_run, checked_support, checked_version
 from crosscheck.engines.contract import USUAL_S, Effort, Engine, Model, Run, Snapshot, Support, Trajectory
 from crosscheck.engines.total_loads import SceneWithPoints
+from flexmb.scene.connectors import sticks
 from flexmb.scene.schema import Scene, UserLaw
 
 TOTAL_LOADS = "total_loads"
 """What an adapter names in `takes` that sums loads itself; for others it is done here."""
+STICKING = "friction that sticks"
+"""What an adapter names in `takes` that holds what friction holds; others have friction that is smooth through zero."""
 LATER = ("connectors", "couplings", "controllers", "events")
 """Collections that scenes did not have when the contract was first written; `takes` names those an adapter handles."""
 NO_START = "begins all runs at t = 0"
@@ -46,6 +49,9 @@ class CheckedEngine:
             items = getattr(scene, collection)
             if items and collection not in known:
                 return Support("no", f'"{items[0].name}": the adapter of engine {self.name} knows no {collection}')
+        for connector in filter(sticks, scene.connectors):
+            if STICKING not in known:
+                return Support("no", f'"{connector.name}": friction of engine {self.name} is smooth, and never sticks')
         for law in scene.controllers:
             if isinstance(law, UserLaw) and not law.function.startswith("flexmb."):
                 reason = f'the function "{law.function}" is not of flexmb: a record would not know its changes'

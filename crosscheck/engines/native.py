@@ -70,7 +70,7 @@ class NativeEngine:
         "faster. Compiling is not timed, and outputs are computed after the timed solve."
     )
 
-    takes = ("connectors", "couplings", "controllers", "events", "total_loads", "t_start")
+    takes = ("connectors", "couplings", "controllers", "events", "friction that sticks", "total_loads", "t_start")
     methods = get_args(Method)
 
     def __init__(

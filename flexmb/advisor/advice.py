@@ -30,6 +30,7 @@ from flexmb.scene.functions import Pulse
 from flexmb.scene.open_loop import refuse_feedback
 from flexmb.scene.problems import SceneWarning
 from flexmb.scene.schema import Scene
+from flexmb.scene.sticking import refuse_sticking
 from flexmb.system.compile import compile
 from flexmb.system.held_stretch import unstretchable
 from flexmb.tables import arguments
@@ -204,6 +205,7 @@ def advise(
     `remedies` what helps.
     """
     refuse_feedback(scene, "advise")
+    refuse_sticking(scene, "models are not advised for instants that change with the model")
     budget = arguments.number("budget", budget)
     if not 0.0 < budget <= MOST_BUDGET:
         raise ValueError(f"the budget is {budget:g}: give a factor above 0, at most {MOST_BUDGET:g}")

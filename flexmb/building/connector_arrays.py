@@ -12,8 +12,18 @@ from flexmb.building.numbering import Numbering
 from flexmb.connectors.catalogue import frame_law_of, law_of
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import IDENTITY
-from flexmb.scene.connectors import AlongHinge, BetweenNodes, HingeSpring, actuator, by_stem
+from flexmb.scene.connectors import (
+    AlongHinge,
+    AngularSpring,
+    BetweenNodes,
+    HingeFriction,
+    HingeSpring,
+    actuator,
+    by_stem,
+    sticks,
+)
 from flexmb.scene.quaternions import rotation_matrix
+from flexmb.scene.sticking import realised
 from flexmb.scene.tree import GROUND, coordinate_of
 from flexmb.tables import arrays as a
 from flexmb.typing import Real
@@ -31,6 +41,14 @@ Number = Callable[[s.Function | None], int]
 def between_nodes(scene: s.Scene) -> list[BetweenNodes]:
     """Connectors between two nodes, in the scene's order."""
     return [connector for connector in scene.connectors if isinstance(connector, BetweenNodes)]
+
+
+def along_hinges(scene: s.Scene) -> tuple[list[AlongHinge], list[AlongHinge]]:
+    """Connectors along hinges in the order of the tables: those in that of springs, and those in that of other laws.
+    Friction that sticks is in both: see `flexmb.scene.sticking.realised`."""
+    along = [connector for connector in scene.connectors if isinstance(connector, AlongHinge)]
+    springs = [connector for connector in along if isinstance(connector, HingeSpring) or sticks(connector)]
+    return springs, [connector for connector in along if not isinstance(connector, HingeSpring)]
 
 
 def end_ports(scene: s.Scene, chain: list[BodyLink], index: dict[str, int]) -> list[tuple[int, Port] | None]:
@@ -86,9 +104,7 @@ def connector_arrays(
             record["smoothing"] = max(SMOOTHING * connector.free_length_m, SMALLEST_SMOOTHING)
             record["function"] = number(connector.force_N)
             record["start"], record["stop"] = _add(laws, _pieces(by_stem(connector), connector.acts))
-    springs = [connector for connector in scene.connectors if isinstance(connector, HingeSpring)]
-    along = [connector for connector in scene.connectors if isinstance(connector, AlongHinge)]
-    others = [connector for connector in along if not isinstance(connector, HingeSpring)]
+    springs, others = along_hinges(scene)
     return {
         "connector": records,
         "end": sides,
@@ -117,12 +133,14 @@ def _speed(scene: s.Scene, connector: AlongHinge, numbering: Numbering) -> int:
 
 
 def _hinge_springs(
-    scene: s.Scene, springs: list[HingeSpring], numbering: Numbering, laws: Rows, number: Number
+    scene: s.Scene, springs: list[AlongHinge], numbering: Numbering, laws: Rows, number: Number
 ) -> a.Record:
     out = np.zeros(len(springs), a.HINGE_SPRING)
-    for row, spring in zip(out, springs, strict=True):
+    for row, connector in zip(out, springs, strict=True):
+        row["speed"] = _speed(scene, connector, numbering)
+        spring = _actuating(connector) if isinstance(connector, HingeFriction) else connector
         law = by_stem(spring)
-        row["speed"], (row["start"], row["stop"]) = _speed(scene, spring, numbering), _add(laws, _pieces(law))
+        row["start"], row["stop"] = _add(laws, _pieces(law))
         for name in ("rest", "damping", "stop_stiffness", "stop_dissipation"):
             row[name] = law[name]
         row["lower"] = -NO_STOP if law["lower"] is None else law["lower"]
@@ -131,10 +149,16 @@ def _hinge_springs(
     return out
 
 
+def _actuating(connector: HingeFriction) -> AngularSpring:
+    """A spring without stiffness, whose actuator is the constant part of friction that sticks."""
+    return AngularSpring(name=connector.name, hinge=connector.hinge, torque_Nm=realised(connector).constant)
+
+
 def _coordinate_laws(scene: s.Scene, connectors: Sequence[AlongHinge], numbering: Numbering) -> a.Record:
     out = np.zeros(len(connectors), a.COORDINATE_LAW)
     for row, connector in zip(out, connectors, strict=True):
-        row["speed"], (row["kind"], numbers) = _speed(scene, connector, numbering), law_of(connector)
+        own = realised(connector).law if isinstance(connector, HingeFriction) and sticks(connector) else connector
+        row["speed"], (row["kind"], numbers) = _speed(scene, connector, numbering), law_of(own)
         row["parameters"][: len(numbers)] = numbers
     return out
 

@@ -13,7 +13,8 @@ import numpy as np
 from flexmb.dense.jets import MovingFrame, profile, skew
 from flexmb.dense.members import DenseTree
 from flexmb.scene import schema as s
-from flexmb.scene.connectors import AlongHinge, BetweenNodes, actuator, by_stem
+from flexmb.scene.connectors import AlongHinge, BetweenNodes, actuator, by_stem, sticks
+from flexmb.scene.sticking import realised
 from flexmb.scene.tree import coordinate_of
 from flexmb.typing import Real
 
@@ -54,7 +55,10 @@ def hold(scene: s.Scene, tree: DenseTree, connector: AlongHinge, q: Real, u: Rea
     x = [scalar for scalar in tree.scalars if scalar.owner == item.name][number]
     match connector:
         case s.AngularFriction() | s.LinearFriction():
-            return Hold(x.u, _friction(by_stem(connector), u[x.u]), 0.0)
+            if not sticks(connector):
+                return Hold(x.u, _friction(by_stem(connector), u[x.u]), 0.0)
+            parts = realised(connector)
+            return Hold(x.u, parts.constant.value + _friction(by_stem(parts.law), u[x.u]), 0.0)
         case s.AngularSpring() | s.LinearSpring():
             load, energy = _spring(by_stem(connector), q[x.q], u[x.u])
             push = actuator(connector)

@@ -7,6 +7,7 @@ import platform
 import shutil
 import sys
 
+from flexmb.scene.connectors import sticks
 from flexmb.scene.schema import Scene
 
 INPUT_KEYS = ("function", "torque_Nm", "force_N")
@@ -30,6 +31,11 @@ def refuse(scene: Scene) -> None:
         raise NotExportable(
             f'{name} cannot be exported: event "{scene.events[0].name}" changes the scene in a run: take the events '
             "out, or export the scene of each stage by itself"
+        )
+    for connector in filter(sticks, scene.connectors):
+        raise NotExportable(
+            f'{name} cannot be exported: friction "{connector.name}" sticks (its smoothing is 0), which is decided by '
+            "events in a run: give it a smoothing speed"
         )
     if scene.total_loads:
         raise NotExportable(

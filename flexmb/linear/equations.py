@@ -10,6 +10,7 @@ from flexmb.scene.check import check_scene
 from flexmb.scene.open_loop import refuse_feedback
 from flexmb.scene.schema import Scene
 from flexmb.scene.sizes import refuse_large_matrix
+from flexmb.scene.sticking import refuse_sticking
 from flexmb.system.compile import compile
 from flexmb.system.system import System
 from flexmb.tables.state import State
@@ -33,6 +34,7 @@ def equations_of(system: System, like: Equations | None = None) -> Equations:
     like: equations of the same scene with other numbers, which are not used meanwhile; their workspaces are reused.
     Without it those of a system are kept.
     """
+    refuse_sticking(system.scene, "a motion at rest is one of many, with no linear model and no equilibrium of its own")
     if like is not None:
         return _made(system, like)
     kept: Equations | None = system.kept.get("equations")

@@ -28,6 +28,7 @@ from flexmb.linear.variations import Equations, RestForces
 from flexmb.parameters.numbers import Number
 from flexmb.scene.open_loop import refuse_feedback
 from flexmb.scene.schema import Scene
+from flexmb.scene.sticking import refuse_sticking
 from flexmb.scene.values import with_values
 from flexmb.system.watches import of_states, warn
 from flexmb.tables import arguments
@@ -99,6 +100,7 @@ def equilibrium_path(scene: Scene, number: str, values: Sequence[float] | Real) 
     if not isinstance(scene, Scene):
         raise TypeError(f"a Scene is needed, not {type(scene).__name__}: the path changes a number of it")
     refuse_feedback(scene, "a path of equilibria")
+    refuse_sticking(scene, "a path of equilibria needs one equilibrium for each value")
     asked = arguments.finite("values", arguments.array("values", values))
     steps = np.diff(asked) if asked.ndim == 1 else np.zeros(0)
     if not len(steps) or not (np.all(steps > 0.0) or np.all(steps < 0.0)):

@@ -6,7 +6,7 @@ Chattering (Zeno behaviour) are so many events in so short a time that the run w
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +19,7 @@ from flexmb.run.propagate import Integration, Raw
 from flexmb.run.situation import Situation
 from flexmb.scene.events import Dock, Impact
 from flexmb.scene.schema import SceneEvent
+from flexmb.scene.sticking import events_of
 from flexmb.scene.tree import watchable
 from flexmb.tables.status import Status
 from flexmb.typing import Index, Real
@@ -78,8 +79,10 @@ class Agenda:
         """Use the events of the present scene, which earlier events may have changed. Sensors of coordinates or speeds
         are replaced by the names of these."""
         scene = self.situation.system.scene
-        names = watchable(scene) if scene.events else {}
-        self.events = tuple(structs.replace(event, watch=names.get(event.watch, event.watch)) for event in scene.events)
+        events, names = events_of(scene), watchable(scene) if scene.events else {}
+        self.events = tuple(structs.replace(event, watch=names.get(event.watch, event.watch)) for event in events)
+        self.of_friction = {event.name for event in events[len(scene.events) :]}
+        """Names of events that end a phase of friction."""
 
     @property
     def _armed(self) -> list[SceneEvent]:
@@ -149,6 +152,12 @@ class Sides:
             if event.name not in self.side:
                 self.side[event.name], self.came[event.name] = -DIRECTIONS[event.crossing], 0
 
+    def forget(self, names: Iterable[str]) -> None:
+        """Events of these names are others from now on."""
+        for name in names:
+            self.side.pop(name, None)
+            self.came.pop(name, None)
+
     def take(self, watched: Sequence[SceneEvent], side: Index, came: Index) -> None:
         """Copy sides from a `Watch`, whose entries are in the order of `watched`."""
         names = [event.name for event in watched]
@@ -156,7 +165,7 @@ class Sides:
 
     def remember(self, anew: bool) -> EventMemory | None:
         """The present state of all events of the scene, for a restart; see `EventMemory` for `anew`."""
-        names, agenda = [event.name for event in self.situation.system.scene.events], self.agenda
+        names, agenda = [event.name for event in self.agenda.events], self.agenda
         if not names:
             return None
         side = [1 if name in agenda.done else self.side.get(name, 0) for name in names]
@@ -188,6 +197,8 @@ class Sides:
         So an event whose quantity starts at its level does not happen until the quantity has left the level and
         returned. The sides of signals are determined in the first step.
         """
+        if event.name in self.agenda.of_friction:
+            return -DIRECTIONS[event.crossing]
         if self.is_signal(event):
             return UNKNOWN
         height, rate = y[self.situation.places[event.watch]] - event.level, self.situation.rate_of(event.watch)

@@ -28,6 +28,7 @@ from flexmb.run.situation import Situation
 from flexmb.run.trajectory import Trajectory
 from flexmb.scene.events import EndRun
 from flexmb.scene.schema import SceneEvent
+from flexmb.scene.sticking import any_sticks, names_of
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.system import System
 from flexmb.tables.status import Status
@@ -97,7 +98,7 @@ class Driver:
         """The trajectory of the run."""
         if begin.events is not None:
             self._sides.recall(begin.events)
-        elif self._situation.system.scene.events:
+        elif begin.memory is None and self._has_instants:
             start, due = unmoved(begin), self._agenda.due_at_start(begin.state.t)
             self._keep_leg(begin, start)
             instant = self._at_instant(start, due)
@@ -124,6 +125,12 @@ class Driver:
             if self._chattering.is_endless:
                 return self._over_anew(instant.raw, ends=False)
             begin = self._situation.going_on(instant.raw)
+
+    @property
+    def _has_instants(self) -> bool:
+        """Whether anything may happen between two steps."""
+        scene = self._situation.system.scene
+        return bool(scene.events) or any_sticks(scene)
 
     def _keep_leg(self, begin: Beginning, end: Raw, early: float = 0.0) -> None:
         """Append a part of the run to its course, before the events at its end change the system."""
@@ -161,15 +168,19 @@ class Driver:
         y, before = self._situation.apart(raw.y)[0], len(self._happened)
         arrived = found if early else self._sides.arriving(raw, found, levels, y)
         for event in arrived:
-            records = self._situation.happen(event, raw, y)
-            self._happened += [replace(record, early=early) for record in records]
+            if event.name not in self._agenda.of_friction:
+                records = self._situation.happen(event, raw, y)
+                self._happened += [replace(record, early=early) for record in records]
             self._agenda.happened(event)
+        self._settle(raw, [event.name for event in arrived], y, early)
         raw = self._situation.with_motion(raw, y)
         if self._whole is None:  # this is the start of the run
             self._sides.start(y)
         else:
             self._sides.move(raw, found, y)
         struck = self._stand(raw, found, y)
+        if struck:
+            self._settle(raw, (), y)
         raw = self._situation.with_motion(raw, y)
         self._agenda.take()  # coming to rest on a stop adds an event
         self._sides.make_known()
@@ -178,6 +189,16 @@ class Driver:
             self.course[-1].events.extend((*arrived, *struck))
             self.course[-1].records.extend(self._happened[before:])
         return AfterEvents(raw, ends)
+
+    def _settle(self, raw: Raw, found: Sequence[str], y: Real, early: float = 0.0) -> None:
+        """Decide which friction sticks, see `flexmb.run.frictions`; found: names of events that happened."""
+        is_start = self._whole is None
+        records, changed = self._situation.settle(raw, y, found)
+        self._happened += [] if is_start else [replace(record, early=early) for record in records]
+        if changed:
+            self._agenda.take()
+            self._sides.forget(event for name in changed for event in names_of(name))
+            self._sides.make_known()
 
     def _stand(self, raw: Raw, found: Sequence[SceneEvent], y: Real) -> list[SceneEvent]:
         """Process bodies in contact with stops, see `flexmb.run.agenda`; returns the events that happened."""

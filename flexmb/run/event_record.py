@@ -15,6 +15,7 @@ import numpy as np
 from flexmb.integrate.watch import RESTED, UNKNOWN
 from flexmb.scene.check import check_scene
 from flexmb.scene.schema import Scene
+from flexmb.scene.sticking import events_of
 from flexmb.tables import arguments
 from flexmb.tables.named import brief
 from flexmb.tables.state import State
@@ -95,7 +96,7 @@ def read(file: Mapping[str, Any]) -> EventMemory:
 
 def examined(memory: EventMemory, scene: Scene) -> EventMemory:
     """A validated copy; ValueError or TypeError for values that no run of this scene can have left."""
-    events, rows = len(scene.events), dict[str, Index]()
+    events, rows = len(events_of(scene)), dict[str, Index]()
     for name, known in (("side", SIDES), ("came", CAMES), ("passed", (0, 1))):
         row = arguments.shaped(name, getattr(memory, name), (events,))
         if not np.all(np.isin(row, known)):

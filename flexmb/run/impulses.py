@@ -10,7 +10,7 @@ Impulses that the motion does not determine, because rows are redundant, are NaN
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -80,6 +80,32 @@ def struck(system: System, state: State, speeds: Mapping[int, float], closing: s
     closures = _determined(rows.wrenches(impulses[len(places) :]), wrenches, rounding)
     held = _determined(held, others[:, : len(places)], rounding)
     return Struck(u, dict(zip(places, held.tolist(), strict=True)), energy, _by_name(system, closures))
+
+
+class Mobility(NamedTuple):
+    """Accelerations of k coordinates by unit loads along each (k,k), with what holds other speeds and closures and
+    without it; energy (J): twice the kinetic energy."""
+
+    constrained: Real
+    free: Real
+    energy: float
+
+
+def mobility(system: System, t: float, y: Real, places: Sequence[int]) -> Mobility:
+    """Of the speeds with these indices in u, at y = [q, u, work]; DynamicsError if the mass matrix is not positive
+    definite."""
+    state = system.state(y[: system.nq].copy(), y[system.nq : -1].copy(), t)
+    held = np.flatnonzero(system.constants.speed["prescribed"] >= 0).tolist()
+    factors, unit = system.factorise(state), np.eye(system.nu)
+    half = factors.half_solve(unit[list(places)].T)
+    along = unit[held] if not system.scene.constraints else np.vstack([unit[held], _rows(system, state).jacobian])
+    free = half.T @ half
+    if len(along):
+        fixed = factors.half_solve(along.T)
+        basis, size, _ = np.linalg.svd(fixed / _sizes(fixed, len(held)), full_matrices=False)
+        basis = basis[:, size > DEPENDENT * size[0]]
+        half = half - basis @ (basis.T @ half)
+    return Mobility(half.T @ half, free, float(state.u @ factors.multiply(state.u)))
 
 
 def _determined(values: Real, others: Real, rounding: float) -> Real:

@@ -34,6 +34,7 @@ from flexmb.run.interruption import Interrupted, Stop
 from flexmb.run.propagate import NO_STATES, PARTS, Integration, kept_for_watches, recursion, room_for
 from flexmb.run.simulate import Made, run_of_many
 from flexmb.run.times import segment_ends
+from flexmb.scene.sticking import any_sticks
 from flexmb.system import algorithms
 from flexmb.system.batch import Batch, LaneTables, in_threads
 from flexmb.system.system import System
@@ -96,7 +97,7 @@ class BatchRun:
     def __call__(self, n: int, threads: int) -> None:
         """Run the first n copies."""
         scene = self._batch.systems[0].scene
-        if scene.events or scene.controllers:
+        if scene.events or scene.controllers or any_sticks(scene):
             calls_python = bool(scene.controllers) and bool(wired(self._batch.systems[0]).laws)
             in_threads(self._by_themselves, range(n), 1 if calls_python else threads)
             return

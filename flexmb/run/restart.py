@@ -27,6 +27,7 @@ from flexmb.run import event_record
 from flexmb.run.event_record import EventMemory
 from flexmb.scene.reading import REAL, TEXT, Unreadable, unpacked
 from flexmb.scene.schema import Scene
+from flexmb.scene.sticking import events_of
 from flexmb.scene.tree import watches_signals
 from flexmb.system.system import System
 from flexmb.tables import arguments
@@ -143,7 +144,7 @@ def _read(path: str | os.PathLike[str]) -> Restart:
     memory = Memory(*(file[name] for name in Memory._fields))
     is_controlled = any(name in file for name in LoopMemory._fields)
     known = LoopMemory(*(file[name] for name in LoopMemory._fields)) if is_controlled else None
-    events = event_record.read(file) if scene.events else None
+    events = event_record.read(file) if events_of(scene) else None
     return Restart(str(file["method"]), scene, float(file["t"]), memory, known, events)  # type: ignore[arg-type]  # examined
 
 
@@ -219,8 +220,9 @@ def fitting(system: System, given: Restart, method: str) -> Restart:
     has_loop = bool(system.scene.controllers) or watches_signals(system.scene)
     if has_loop != (known is not None):
         raise ValueError(f"the restart has {'no' if has_loop else 'a'} memory of controllers: it is damaged")
-    if bool(system.scene.events) != (restart.events is not None):
-        said = "no" if system.scene.events else "a"
+    has_events = bool(events_of(system.scene))
+    if has_events != (restart.events is not None):
+        said = "no" if has_events else "a"
         raise ValueError(f"the restart has {said} memory of events: it is damaged")
     states = 0 if known is None else _refuse_other_controllers(system, restart, known)
     if len(restart.memory.y) != motion + states:

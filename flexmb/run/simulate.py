@@ -28,6 +28,7 @@ from flexmb.run.trajectory import Trajectory
 from flexmb.scene.check import check_and_warn
 from flexmb.scene.problems import SceneWarning
 from flexmb.scene.schema import Scene
+from flexmb.scene.sticking import any_sticks
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.compile import assembled
@@ -222,7 +223,7 @@ def _followed(
     system, times = stage
     times = np.array([*times[times < stopped], stopped])
     follow = FollowedRun(times, settings, algorithm, stabilise, steps)
-    if not system.scene.events:
+    if not system.scene.events and not any_sticks(system.scene):
         return follow([Stretch(system, origin(system, float(times[0]), state, settings.method), stopped)], until)
     course: list[Leg] = []
     ends = times if settings.integrator.fixed else times[[0, -1]]

@@ -23,6 +23,7 @@ from flexmb.run.times import refuse_times, sample_times
 from flexmb.scene.problems import SceneWarning
 from flexmb.scene.schema import Scene
 from flexmb.scene.sizes import refuse_bytes
+from flexmb.scene.sticking import any_sticks
 from flexmb.system.batch import Batch, number_of_threads
 from flexmb.system.compile import compile_batch
 from flexmb.system.system import System
@@ -89,12 +90,17 @@ def simulate_batch(
             raise KeyboardInterrupt
         turned, bent, whole = runner.turned, runner.bent, runner.whole
         scene = batch.system(0).scene
-        if batch.in_lanes and not chosen.integrator.linearises and not scene.controllers and not scene.events:
+        if batch.in_lanes and not chosen.integrator.linearises and not _by_themselves(scene):
             computed(batch.system(0), perf_counter() - start, BATCHES)
     made = _gathered(batch, times, found, len(rows[0]), whole)
     for warning in (*_doubted(batch, whole), *_watched(made, turned, bent)):
         warnings.warn(warning, SceneWarning, stacklevel=2)
     return made
+
+
+def _by_themselves(scene: Scene) -> bool:
+    """Whether copies are not run in lanes, as something happens to each at its own instants."""
+    return bool(scene.controllers or scene.events) or any_sticks(scene)
 
 
 def _watched(runs: BatchTrajectory, turned: Mapping[int, Sequence[TooFast]], bent: Mapping[int, Real]) -> Iterator[str]:

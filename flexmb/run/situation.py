@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import AbstractContextManager
+from dataclasses import replace as replace_fields
+from functools import partial
 from math import asin, pi
 from typing import TYPE_CHECKING, NamedTuple, assert_never
 
@@ -12,14 +15,17 @@ from msgspec.structs import replace
 from flexmb.integrate.settings import Settings
 from flexmb.kept import kept
 from flexmb.run.event_record import EventRecord
+from flexmb.run.frictions import Frictions, Settled
 from flexmb.run.impulses import Struck, struck
 from flexmb.run.origin import Beginning
 from flexmb.run.outputs import doubt_about, observed
 from flexmb.run.propagate import Integration, Raw, integration
 from flexmb.run.trajectory import Trajectory
+from flexmb.scene.connectors import Phase
 from flexmb.scene.events import Action, Change, Dock, EndRun, Impact, Latch, Release, Separate
 from flexmb.scene.functions import Constant
 from flexmb.scene.schema import Closure, Scene, SceneEvent, Wheel
+from flexmb.scene.sticking import Sticking, any_sticks, holding_sensor, sticking, with_phases
 from flexmb.scene.stops import leaves, leaving, resting, stop_sensor
 from flexmb.scene.tree import Coordinate, rate_name, scalar_paths
 from flexmb.scene.values import changed_at, values_at
@@ -66,6 +72,7 @@ class Situation:
         self._built = [system]
         self.doubts: list[str] = []
         """Warnings about integrations that did not fail."""
+        self._frictions = Frictions(self) if any_sticks(system.scene) else None
 
     def integration(self) -> AbstractContextManager[Integration]:
         """An integration of the present system for exclusive use within the context."""
@@ -136,9 +143,43 @@ class Situation:
         """Stop the coordinate of an impact and hold it on its stop, until an event releases it before the stop would
         pull; a motor that acts along it remains. push: the sign of the stop's load."""
         name, at = impact.coordinate, self._instant(t, y)
+        self._free_of_friction(at)
         self._strike(at, name, 0.0)
         self._hold(at, name, leaves(event, name, push))
         return _recorded(f"{event.name}: at rest", at, self._state(at.t, at.y))
+
+    def settle(self, raw: Raw, y: Real, found: Collection[str]) -> Settled:
+        """Decide which friction sticks after what happened at the end of an integration: see `flexmb.run.frictions`.
+        found: names of events of friction; y = [q, u, work]."""
+        if self._frictions is None:
+            return Settled([], set())
+        return self._frictions.settle(raw, y, found, self._instant(raw.t, y))
+
+    def holds_otherwise(self, friction: Sticking) -> bool:
+        """Whether a latch or a stop holds the coordinate of friction."""
+        return friction.connector.phase != "sticking" and self.is_held(friction.coordinate)
+
+    def with_friction(self, phases: Mapping[str, Phase], held: Sequence[Sticking], at: EventInstant) -> None:
+        """Give friction these phases; that in `held` holds its coordinate where it is, all other friction none."""
+        scene = self.system.scene
+        for each in sticking(scene):
+            if each.connector.phase == "sticking":
+                scene = self._freed(scene, each.coordinate)
+        scene = with_phases(scene, phases)
+        for each in held:
+            scene = changed_at(scene, self._paths[each.coordinate], partial(self._still, at, each.coordinate, True))
+        speeds = {self.speed_place(each.coordinate) - self.system.nq: 0.0 for each in held}
+        if speeds and (self.system.scene.constraints or np.any(at.y[self.speeds][list(speeds)])):
+            self._take(at, struck(self.system, self._state(at.t, at.y), speeds))
+        self._become(scene, at)
+        if held:
+            self.system.project(at.t, at.y, self.system.constants)
+
+    def recorded_of_friction(self, names: Sequence[str], at: EventInstant) -> list[EventRecord]:
+        """The records of what happened to friction; the first has what all of it changed together."""
+        after = self._state(at.t, at.y)
+        records = [_recorded(name, at, after) for name in names]
+        return records[:1] + [replace_fields(each, impulses={}, closures={}, energy_change=0.0) for each in records[1:]]
 
     def at_rest(self, coordinate: str, t: float, y: Real) -> Real:
         """A copy of y = [q, u, work] after an impulse that makes the speed of a coordinate zero."""
@@ -148,14 +189,14 @@ class Situation:
 
     def speed(self, coordinate: str, y: Real) -> float:
         """The speed of a scalar coordinate."""
-        return float(y[self._rate_place(coordinate)])
+        return float(y[self.speed_place(coordinate)])
 
     def _is_spent(self, name: str, push: int, raw: Raw, y: Real) -> bool:
         """Whether a rebound rises from the stop by no more than the tolerance, against the acceleration towards it.
 
         The acceleration is that of the coordinate at rest, because loads may depend on the speed of the rebound.
         """
-        place = self._rate_place(name)
+        place = self.speed_place(name)
         rebound = push * y[place]
         pressed = -push * self.accelerations(raw, self.at_rest(name, raw.t, y))[place - self.system.nq]
         allowed = self.settings.atol + self.settings.rtol * abs(y[self.places[name]])
@@ -166,7 +207,8 @@ class Situation:
         path = self._paths.get(watched)
         return None if path is None else self.places[rate_name(watched, path)]
 
-    def _rate_place(self, coordinate: str) -> int:
+    def speed_place(self, coordinate: str) -> int:
+        """Index in [q, u, work] of the speed of a scalar coordinate."""
         return self.places[rate_name(coordinate, self._paths[coordinate])]
 
     def is_held(self, watched: str) -> bool:
@@ -175,6 +217,8 @@ class Situation:
         return place is not None and self.system.constants.speed["prescribed"][place - self.system.nq] >= 0
 
     def _do(self, action: Action, at: EventInstant) -> None:
+        if isinstance(action, Latch | Impact | Dock):
+            self._free_of_friction(at)
         match action:
             case Latch(coordinate=name):
                 self._strike(at, name, 0.0)
@@ -182,9 +226,7 @@ class Situation:
             case Impact(coordinate=name, restitution=restitution):
                 self._strike(at, name, -restitution)
             case Release(coordinate=name):
-                [item] = values_at(self.given, self._paths[name])
-                freed = replace(item, **{item.KEYS.prescribed: None})
-                self._become(changed_at(self.system.scene, self._paths[name], lambda _: freed), at)
+                self._become(self._freed(self.system.scene, name), at)
             case Change(path=path, value=value):
                 energy = self._energy(at)
                 self._become(self.system.scene.with_values({path: value}), at)
@@ -198,6 +240,17 @@ class Situation:
                 pass
             case _:
                 assert_never(action)
+
+    def _freed(self, scene: Scene, coordinate: str) -> Scene:
+        """A scene in which a coordinate is free, with the spring, damper and motor that the scene gives it."""
+        [item] = values_at(self.given, self._paths[coordinate])
+        freed = replace(item, **{item.KEYS.prescribed: None})
+        return changed_at(scene, self._paths[coordinate], lambda _: freed)
+
+    def _free_of_friction(self, at: EventInstant) -> None:
+        """Let go what friction holds: its load is bounded, so that it takes no part in an impulse."""
+        if self._frictions is not None:
+            self.with_friction({each.name: "idle" for each in sticking(self.system.scene)}, (), at)
 
     def _given_closure(self, name: str, *, closed: bool) -> Closure:
         """A closure as the scene gives it, open or closed."""
@@ -258,14 +311,14 @@ class Situation:
 
     def _strike(self, at: EventInstant, name: str, factor: float) -> None:
         """Apply an impulse that multiplies the speed of a coordinate by `factor`."""
-        place = self._rate_place(name)
+        place = self.speed_place(name)
         speeds = {place - self.system.nq: factor * at.y[place]}
         self._take(at, struck(self.system, self._state(at.t, at.y), speeds))
 
     def _take(self, at: EventInstant, state: Struck) -> None:
         """Take over the speeds after impulses, and add these to those of the instant."""
         y, nq = at.y, self.system.nq
-        rates = {self._rate_place(path): path for path in self._paths}
+        rates = {self.speed_place(path): path for path in self._paths}
         y[nq:-1] = state.u
         y[-1] += state.energy
         for j, impulse in state.impulses.items():
@@ -276,18 +329,19 @@ class Situation:
 
     def _hold(self, at: EventInstant, name: str, leaving_stop: SceneEvent | None = None) -> None:
         """Hold a coordinate or wheel where it is; on a stop with its motor, until the event that it leaves the stop."""
-
-        def held(item: Coordinate | Wheel) -> Coordinate | Wheel:
-            keys = item.KEYS
-            kept = {keys.effort: getattr(item, keys.effort) if leaving_stop is not None else None}
-            still = {keys.value: 0.0, keys.rate: 0.0, keys.prescribed: Constant(value=float(at.y[self.places[name]]))}
-            return replace(item, **still, **kept)
-
-        scene = changed_at(self.system.scene, self._paths[name], held)
+        still = partial(self._still, at, name, leaving_stop is not None)
+        scene = changed_at(self.system.scene, self._paths[name], still)
         if leaving_stop is not None:
             scene = replace(scene, events=(*scene.events, leaving_stop))
         self._become(scene, at)
         self.system.project(at.t, at.y, self.system.constants)
+
+    def _still(self, at: EventInstant, name: str, driven: bool, item: Coordinate | Wheel) -> Coordinate | Wheel:
+        """A coordinate or wheel held where it is; driven: with its motor."""
+        keys = item.KEYS
+        kept = {keys.effort: getattr(item, keys.effort) if driven else None}
+        still = {keys.value: 0.0, keys.rate: 0.0, keys.prescribed: Constant(value=float(at.y[self.places[name]]))}
+        return replace(item, **still, **kept)
 
     def _off_stop(self, event: SceneEvent) -> Scene:
         """The scene after an event: without it, if it was one that released a coordinate from its stop."""
@@ -331,9 +385,11 @@ def _with_closure(scene: Scene, changed: Closure) -> Scene:
 
 
 def with_stops(system: System) -> System:
-    """The system with sensors for the loads of all stops on which a coordinate may come to rest."""
+    """The system with sensors for the loads of all stops on which a coordinate may come to rest, and of all friction
+    that may hold one."""
     known = {sensor.name for sensor in system.scene.sensors}  # the scene of a resumed run has these sensors already
     sensors = [stop_sensor(event, action) for event, action in resting(system.scene)]
+    sensors += map(holding_sensor, sticking(system.scene))
     missing = [sensor for sensor in sensors if sensor.name not in known]
     if not missing:
         return system

@@ -258,7 +258,9 @@ def gathered(observation: Observation, rows: Real) -> dict[str, Any]:
         "energy": _by_name(ENERGIES, found["energy"]),
         "momentum": found["momentum"].copy(),
         "connectors": _by_name(names.connectors, found["connectors"]),
-        "hinge_forces": _by_name(names.hinge_forces, found["hinge_forces"][:, :, None]),
+        "hinge_forces": {
+            name: load.copy() for name, load in names.along_hinges(found["hinge_forces"], found["drives"]).items()
+        },
     }
 
 

@@ -22,8 +22,9 @@ __all__ = [
 
 Stiffening = tuple[Annotated[Number, unit("of the load, per power of x")], ...]
 Stribeck = Annotated[float, within(0.0, excluded=0.0, noun="Stribeck speed")]
-SLOW = "give a positive speed, well below those that matter"
-Smoothing = Annotated[float, within(0.0, excluded=0.0, noun="smoothing speed", remedy=SLOW)]
+SLOW = "give a speed well below those that matter, or 0 for friction that sticks"
+Smoothing = Annotated[float, within(0.0, noun="smoothing speed", remedy=SLOW)]
+Phase = Literal["undecided", "idle", "sticking", "forward", "backward"]
 NONE6: Matrix6 = ((0.0,) * 6,) * 6
 
 
@@ -137,6 +138,10 @@ class AngularFriction(SceneStruct, frozen=True, kw_only=True, tag_field="kind", 
     The torque is `sliding_Nm`, near rest rising to `static_Nm` as Hess and Soom have it, and smooth through zero:
     [sliding + (static - sliding) / (1 + (v / stribeck)²)] v / sqrt(v² + smoothing²), v the rate. What would stick
     creeps with a rate of the order of `smoothing_rad_s`; the smaller it is, the stiffer the equations.
+
+    With a smoothing of 0 it sticks: where the rate comes to zero, the coordinate is held as long as the load that this
+    takes is `static_Nm` at most; beyond, it slips. `stribeck_rad_s` may then be left out: friction is `sliding_Nm` at
+    every rate but zero. `phase` is what a run writes into the scene of its restart; leave it out.
     """
 
     name: str
@@ -146,6 +151,7 @@ class AngularFriction(SceneStruct, frozen=True, kw_only=True, tag_field="kind", 
     static_Nm: NotNegative | None = None
     stribeck_rad_s: Stribeck | None = None
     smoothing_rad_s: Smoothing
+    phase: Phase = "undecided"
 
     ANGULAR: ClassVar[bool] = True
 
@@ -160,6 +166,7 @@ class LinearFriction(SceneStruct, frozen=True, kw_only=True, tag_field="kind", t
     static_N: NotNegative | None = None
     stribeck_m_s: Stribeck | None = None
     smoothing_m_s: Smoothing
+    phase: Phase = "undecided"
 
     ANGULAR: ClassVar[bool] = False
 
@@ -169,6 +176,11 @@ HingeSpring = AngularSpring | LinearSpring
 HingeFriction = AngularFriction | LinearFriction
 AlongHinge = HingeSpring | HingeFriction
 Connector = BetweenNodes | AlongHinge
+
+
+def sticks(connector: Connector) -> bool:
+    """Whether it is friction with a true zero of the speed."""
+    return isinstance(connector, HingeFriction) and by_stem(connector)["smoothing"] == 0.0
 
 
 def by_stem(connector: Connector) -> dict[str, Any]:

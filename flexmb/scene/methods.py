@@ -307,21 +307,23 @@ class SchemaMethods(Collector):
     def angular_friction(
         self, name: str, hinge: str, *, sliding: float, smoothing: float, coordinate: str = "",
         static: float | None = None, stribeck: float | None = None,
+        phase: Literal["backward", "forward", "idle", "sticking", "undecided"] = "undecided",
     ) -> Self:  # fmt: skip
         """Dry friction along an angle of a hinge, or in the bearing of a wheel; `hinge` names either.
 
         See AngularFriction: `sliding` (N m, ≥ 0), `static` (N m, ≥ 0), `stribeck` (rad/s, > 0),
-        `smoothing` (rad/s, > 0).
+        `smoothing` (rad/s, ≥ 0).
         """
         return self._made(s.AngularFriction, locals())
 
     def linear_friction(
         self, name: str, hinge: str, *, sliding: float, smoothing: float, coordinate: str = "",
         static: float | None = None, stribeck: float | None = None,
+        phase: Literal["backward", "forward", "idle", "sticking", "undecided"] = "undecided",
     ) -> Self:  # fmt: skip
         """Dry friction along a displacement of a hinge or point mass: see AngularFriction.
 
-        See LinearFriction: `sliding` (N, ≥ 0), `static` (N, ≥ 0), `stribeck` (m/s, > 0), `smoothing` (m/s, > 0).
+        See LinearFriction: `sliding` (N, ≥ 0), `static` (N, ≥ 0), `stribeck` (m/s, > 0), `smoothing` (m/s, ≥ 0).
         """
         return self._made(s.LinearFriction, locals())
 

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 
 from flexmb.scene import control as c
 from flexmb.scene.bodies import IDENTITY, ZERO, BeamBody, Body, ModalBody, Quaternion, RigidBody, SidBody, Vector
-from flexmb.scene.connectors import AlongHinge, AngularFriction, BetweenNodes
+from flexmb.scene.connectors import AlongHinge, AngularFriction, BetweenNodes, sticks
 from flexmb.scene.couplings import CoupledCoordinate, Coupling
 from flexmb.scene.events import Dock, Impact, Separate
 from flexmb.scene.freedoms import AngularCoordinate, Coordinate, LinearCoordinate
@@ -248,7 +248,10 @@ def _coupled(hinges: dict[str, Hinge], item: Coupling | CoupledCoordinate, facto
 
 
 def watches_signals(scene: Scene) -> bool:
-    """Whether any event watches, or may later watch (the load of a stop), a signal of a sensor or controller."""
+    """Whether any event watches, or may later watch (the load of a stop or of friction that sticks), a signal of a
+    sensor or controller."""
+    if any(map(sticks, scene.connectors)):
+        return True
     if not scene.events:
         return False
     rests = any(isinstance(action, Impact) and action.rests for event in scene.events for action in event.actions)

@@ -19,6 +19,7 @@ from flexmb.scene.check.walk import values
 from flexmb.scene.convert import ROOT
 from flexmb.scene.functions import Pulse
 from flexmb.scene.schema import DriveSensor, LoadSensor, Scene
+from flexmb.scene.sticking import refuse_sticking
 from flexmb.scene.tree import watches_signals
 from flexmb.sensitivity.law_rates import reaches_event, reaches_laws
 from flexmb.sensitivity.part_scene import PartNumber, PartScene, all_changes, changed, differ_in_mechanics
@@ -118,6 +119,7 @@ def admitted(scene: Scene, names: Sequence[str]) -> Admitted:
 
 def prepared(scene: Scene) -> System:
     """The system whose runs are differentiated; NotImplementedError for scenes whose runs have no derivatives."""
+    refuse_sticking(scene, "derivatives through its phases are not available", "compare runs with other values")
     refuse_measured_loads(scene)
     system = with_stops(assembled(scene))
     refuse_opened_closures(system)

@@ -131,6 +131,8 @@ class Constraints:
     def accelerations(self, state: State, algorithm: Algorithm = "articulated") -> Real:
         """udot (nu,) of the closed chain under all loads, at a state that closes all closures."""
         t, y = self._system.layout.entering(state)
+        if self._system.has_friction_that_sticks:
+            self._system.refuse_undecided(t, y)
         return finite_result(self._motion(t, y, algorithm).accelerations, t)
 
     def _motion(self, t: float, y: Real, algorithm: Algorithm) -> ClosedMotion:

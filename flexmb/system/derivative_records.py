@@ -155,6 +155,8 @@ def by_names(
     now = parts(row, observation.columns)
     changes = {name: change[at].reshape(*shape, k) for name, (at, shape) in observation.columns.items()}
 
+    along = names.along_hinges(changes["hinge_forces"].T, changes["drives"].T)
+
     def each(group: Iterable[str], part: str) -> dict[str, By]:
         return {name: split(changes[part][i]) for i, name in enumerate(group)}
 
@@ -170,7 +172,7 @@ def by_names(
         energy=each(ENERGIES, "energy"),
         momentum=split(changes["momentum"]),
         connectors=each(names.connectors, "connectors"),
-        hinge_forces={name: split(changes["hinge_forces"][i : i + 1]) for i, name in enumerate(names.hinge_forces)},
+        hinge_forces={name: split(rows.T) for name, rows in along.items()},
     )
 
 

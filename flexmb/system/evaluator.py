@@ -16,7 +16,7 @@ from flexmb.jit.pointer import REAL, STATUS, VECTOR
 from flexmb.system import algorithms
 from flexmb.system.mechanics import Mechanics
 from flexmb.tables.per_thread import per_thread
-from flexmb.tables.state import finite_result
+from flexmb.tables.state import NotFiniteError, finite_result
 from flexmb.tables.status import OK
 from flexmb.typing import Real
 
@@ -112,7 +112,11 @@ class _Careful:
         if status != OK:
             self.system.check_status(status, int(self._w.fault[0]))
         self.rates[:] = self._w.speed["acceleration"]
-        finite_result(self.rates, t)
+        try:
+            finite_result(self.rates, t)
+        except NotFiniteError:
+            self.system.refuse_undecided(t, y)
+            raise
         self.system.check_precision(t, y, self._w)
         return self.shown
 

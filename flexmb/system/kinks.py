@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexmb.building.connector_arrays import between_nodes
-from flexmb.scene.connectors import HingeSpring
+from flexmb.building.connector_arrays import along_hinges, between_nodes
 from flexmb.system.scene_arrays import SceneArrays
 from flexmb.tables.arrays import BOTH, Constants, Workspace
 from flexmb.tables.state import DynamicsError
@@ -33,8 +32,7 @@ def refuse_kinks(arrays: SceneArrays, w: Workspace) -> None:
     by time are those on the side that the function itself belongs to.
     """
     c = arrays.constants
-    springs = (connector for connector in arrays.scene.connectors if isinstance(connector, HingeSpring))
-    for spring, row in zip(springs, c.hinge_spring, strict=True):
+    for spring, row in zip(along_hinges(arrays.scene)[0], c.hinge_spring, strict=True):
         q = float(w.q[c.speed["coordinate"][row["speed"]]])
         for limit in (float(row["lower"]), float(row["upper"])):
             if row["stop_stiffness"] > 0.0 and meets(q, limit, abs(limit)):

@@ -225,7 +225,7 @@ class Linearisation:
     @kept
     def has_corners(self) -> bool:
         """Whether a law of the scene has corners, at which no derivatives exist."""
-        return has_corners(self._system.constants)
+        return has_corners(self._system.constants) or self._system.has_friction_that_sticks
 
     @property
     def refusal(self) -> Refusal | None:
@@ -235,6 +235,7 @@ class Linearisation:
     def refuse_corners(self, t: float, y: Real) -> None:
         """NotDifferentiableError where a law has a corner at y = [q, u, work]: the one check of all derivatives."""
         if self.has_corners:
+            self._system.refuse_undecided(t, y)
             self._system.inverse_at(t, y, np.zeros(self._system.nu))  # evaluates the connectors
             refuse_kinks(self._system, self._system.own_workspace)
 

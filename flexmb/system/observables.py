@@ -83,7 +83,8 @@ class Names:
     """Names of the observed quantities, in the order of the arrays.
 
     markers: with (body, port) of each. driven: hinges and wheels with prescribed coordinates, with the places of these
-    in u. connectors: those between nodes. hinge_forces: springs along hinges, then other laws along hinges.
+    in u. connectors: those between nodes. hinge_forces: springs along hinges, then other laws along hinges; friction
+    that sticks is among both. holding: the place in u of a coordinate that friction holds, by its name.
     """
 
     markers: dict[str, tuple[int, int]]
@@ -93,6 +94,18 @@ class Names:
     driven: dict[str, Index]
     connectors: Sequence[str] = ()
     hinge_forces: Sequence[str] = ()
+    holding: Mapping[str, int] = field(default_factory=dict)
+
+    def along_hinges(self, hinge_forces: Real, drives: Real) -> dict[str, Real]:
+        """Loads (...,1) of connectors along hinges by name, from those of the tables (...,S) and drive loads (...,nu):
+        of friction the sum of its two parts or, while it sticks, the load that holds the coordinate."""
+        found = dict[str, Real]()
+        for i, name in enumerate(self.hinge_forces):
+            own = hinge_forces[..., i : i + 1]
+            found[name] = found[name] + own if name in found else own
+        for name, place in self.holding.items():
+            found[name] = drives[..., place : place + 1]
+        return found
 
 
 class Observation:
@@ -150,5 +163,5 @@ class Observation:
             energy=_ENERGY(zip(ENERGIES, found["energy"].tolist(), strict=True)),
             momentum=found["momentum"],
             connectors=_CONNECTORS(zip(names.connectors, found["connectors"], strict=True)),
-            hinge_forces=_HINGE_FORCES(zip(names.hinge_forces, found["hinge_forces"][:, None], strict=True)),
+            hinge_forces=_HINGE_FORCES(names.along_hinges(found["hinge_forces"], found["drives"])),
         )

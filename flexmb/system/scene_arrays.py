@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from flexmb.building.assemble import assemble
-from flexmb.building.connector_arrays import between_nodes
+from flexmb.building.connector_arrays import along_hinges, between_nodes
 from flexmb.building.links import links
 from flexmb.building.models import wheels_by_body
 from flexmb.building.numbering import Numbering
@@ -15,12 +15,12 @@ from flexmb.jain.elimination import Elimination, with_elimination
 from flexmb.kept import kept
 from flexmb.motion import coordinates
 from flexmb.scene import schema as s
-from flexmb.scene.connectors import AlongHinge, HingeSpring
+from flexmb.scene.sticking import Sticking, any_sticks, sticking
 from flexmb.system.observables import Names
 from flexmb.tables import arguments
 from flexmb.tables.arrays import Constants
 from flexmb.tables.features import DERIVATIVES, ITS_OWN, RECURSION, WITH_EVERYTHING, Choice
-from flexmb.tables.state import State
+from flexmb.tables.state import DynamicsError, State
 from flexmb.tables.status import Status
 from flexmb.typing import Index, Real
 
@@ -137,16 +137,38 @@ class SceneArrays:
         on_bodies = [wheel.name for link in self.links for wheel in wheels.get(link.name, ())]
         closures = [closure.name for closure in scene.constraints]
         between = [node.name for node in between_nodes(scene)]
-        along_hinges = [connector for connector in scene.connectors if isinstance(connector, AlongHinge)]
-        along_hinges.sort(
-            key=lambda connector: not isinstance(connector, HingeSpring)
-        )  # springs come first, as in the tables
-        along = [hinge.name for hinge in along_hinges]
-        return Names(self.markers, hinges, on_bodies, closures, self._driven([*hinges, *on_bodies]), between, along)
+        along = [connector.name for rows in along_hinges(scene) for connector in rows]
+        driven = self._driven([*hinges, *on_bodies])
+        return Names(self.markers, hinges, on_bodies, closures, driven, between, along, self._holding())
+
+    @kept
+    def has_friction_that_sticks(self) -> bool:
+        """Whether the scene has any."""
+        return any_sticks(self.scene)
+
+    def refuse_undecided(self, t: float, y: Real) -> None:
+        """DynamicsError where friction that sticks is at rest at y = [q, u, work] and no run has decided of it."""
+        u = y[-1 - self.nu : -1]
+        for friction in sticking(self.scene):
+            if friction.connector.phase == "undecided" and u[self._along(friction)] == 0.0:
+                raise DynamicsError(
+                    f'at t = {t:g} s friction "{friction.name}" sticks (its smoothing is 0) and {friction.coordinate} '
+                    "is at rest: whether it holds is decided in a run; use flexmb.simulate, or give it a smoothing "
+                    "speed"
+                )
+
+    def _holding(self) -> dict[str, int]:
+        """Places in u of the coordinates that friction holds, by its name."""
+        return {each.name: self._along(each) for each in sticking(self.scene) if each.connector.phase == "sticking"}
+
+    def _along(self, friction: Sticking) -> int:
+        """The place in u of its coordinate."""
+        return self.speed(friction.owner).start + friction.place
 
     def _driven(self, names: list[str]) -> dict[str, Index]:
-        """Places in u of the prescribed coordinates, by hinge or wheel."""
+        """Places in u of the prescribed coordinates, by hinge or wheel, but those that friction holds."""
         driven = self.constants.speed["prescribed"] >= 0
+        driven[list(self._holding().values())] = False
         if not np.any(driven):
             return {}
         places = ((name, self.speed(name)) for name in names)

@@ -12,6 +12,7 @@ from flexmb.scene.check.starting import started
 from flexmb.scene.check.walk import entries
 from flexmb.scene.problems import Doubt
 from flexmb.scene.schema import Scene
+from flexmb.scene.sticking import sticking, with_phases
 
 if TYPE_CHECKING:
     from flexmb.system.system import System
@@ -34,7 +35,7 @@ def check_scene(scene: Scene, t_end: float | None = None, t_start: float = 0.0) 
     from flexmb.system.compile import assembled  # imported here because a scene with defects needs no compiler
 
     with started(scene):
-        system = assembled(scene)
+        system = assembled(with_phases(scene, {each.name: "idle" for each in sticking(scene)}))
         start = system.initial_state
         system.evaluate(start.t, start.q, start.u)
     return (*doubts, *_watched(system, start, start.t if t_end is None else t_end))

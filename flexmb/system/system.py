@@ -495,6 +495,8 @@ class System(Mechanics):
         return self._evaluate(*self.layout.packed(t, q, u), algorithm)
 
     def _evaluate(self, t: float, y: Real, algorithm: Algorithm) -> Evaluation:
+        if self.has_friction_that_sticks:
+            self.refuse_undecided(t, y)
         if self.constraints is not None:
             return self.constraints.evaluation(t, y, algorithm)
         self._observe(t, y, algorithm)

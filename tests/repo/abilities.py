@@ -18,6 +18,7 @@ import flexmb as fm
 from flexmb.export.refusals import refuse
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.scene.bodies import BeamBody
+from flexmb.scene.sticking import events_of
 from flexmb.scene.tree import GROUND
 from tests.flexmb.run.every_kind import scenes
 from tests.repo.project import ROOT
@@ -51,7 +52,8 @@ def kinds() -> dict[str, Kind]:
     """The kinds of scenes, by their names on the page."""
     named = {
         "rigid": "nothing", "flexible": "modes that are condensed", "event at a time": "a time", "latch": "a level",
-        "impact": "a signal", "rest on a stop": "a stop to rest on", "continuous controller": "a continuous controller",
+        "impact": "a signal", "rest on a stop": "a stop to rest on", "friction that sticks": "friction that sticks",
+        "continuous controller": "a continuous controller",
         "sampled controller": "a sampled controller", "law in Python": "a law of the user's",
         "closures": "closures", "closures, latch": "closures and events",
         "closures, sampled controller": "closures and a controller",
@@ -76,7 +78,7 @@ def _resumed(kind: Kind) -> object:
     run = _run(kind)
     if run.restart is None or run.stopped_at < kind.t_end:
         raise Absent
-    left = run.restart.scene if kind.scene.events else fm.compile(kind.scene)
+    left = run.restart.scene if events_of(run.restart.scene) else fm.compile(kind.scene)
     return fm.simulate(left, 1.5 * kind.t_end, samples=3, state=run.restart, **ROUGH)
 
 

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from crosscheck.library.case import CaseError
 from crosscheck.library.mutations.edits import conjugated, multiplied, of_connector
 from crosscheck.library.mutations.mutation import DROPPED, FACTOR, Mutation, MutationTarget, SceneChange
-from flexmb.scene.connectors import Bushing, Connector, Matrix6, SpringDamper, by_stem
+from flexmb.scene.connectors import Bushing, Connector, Matrix6, SpringDamper, by_stem, sticks
 from flexmb.scene.keys import split_unit
 from flexmb.scene.schema import Scene
 
@@ -37,6 +37,16 @@ def _scaled(stems: tuple[str, ...], factor: float) -> SceneChange:
         return multiplied(connector, keys, factor)
 
     return of_connector(changed)
+
+
+@of_connector
+def _without_losses(connector: Connector) -> Connector:
+    """Friction that sticks needs some: without any it is written as smooth friction of zero."""
+    keys = {split_unit(key)[0]: key for key in connector.__struct_fields__}
+    without = multiplied(connector, [keys[stem] for stem in LOSING if stem in keys], DROPPED)
+    if not sticks(connector):
+        return without
+    return replace(without, **{keys["static"]: None, keys["stribeck"]: None, keys["smoothing"]: 1.0})
 
 
 @of_connector
@@ -101,7 +111,7 @@ MUTATIONS = (
         "no damping or friction of a connector",
         "dissipation left out",
         connectors,
-        _scaled(LOSING, DROPPED),
+        _without_losses,
     ),
     Mutation(
         "connector_one_sided",

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from math import isfinite
 
 from flexmb.scene.check.beams import beams
-from flexmb.scene.check.connectors import connectors
+from flexmb.scene.check.connectors import connectors, friction_that_sticks
 from flexmb.scene.check.control import control
 from flexmb.scene.check.events import events
 from flexmb.scene.check.exact_beams import jumps
@@ -28,7 +28,7 @@ _LARGEST_BITS = 1000  # of integers that are finite as floats
 STRUCTURE = (unique_names, references, tree)
 PHYSICS = (
     rigid_bodies, beams, modal_bodies, modal_states, hinges, closures, couplings, wheels, point_masses, connectors,
-    control, events,
+    friction_that_sticks, control, events,
 )  # fmt: skip
 
 

@@ -8,13 +8,16 @@ from operator import itemgetter
 from typing import assert_never
 
 import numpy as np
+from msgspec.structs import replace
 
 from flexmb.scene import schema as s
 from flexmb.scene.check.numbers import in_range
-from flexmb.scene.check.walk import sound
-from flexmb.scene.connectors import AlongHinge, HingeFriction, HingeSpring, by_stem
+from flexmb.scene.check.walk import entries, sound
+from flexmb.scene.connectors import AlongHinge, HingeFriction, HingeSpring, by_stem, sticks
 from flexmb.scene.problems import Defect, Doubt, Place
-from flexmb.scene.tree import GROUND, coordinate_of
+from flexmb.scene.sticking import any_sticks, holding_sensor, names_of, sticking
+from flexmb.scene.tree import GROUND, coordinate_of, scalar_paths
+from flexmb.scene.values import values_at
 
 HIGHEST = 4  # coefficients of `stiffening`: a law is a polynomial of degree five at most
 SYMMETRIC = 1e-9  # tolerance of matrices printed to ten digits, relative to the largest element
@@ -108,6 +111,12 @@ def _stops(place: Place, connector: HingeSpring) -> Iterator[Defect]:
 
 def _friction(place: Place, connector: HingeFriction) -> Iterator[Defect]:
     law = by_stem(connector)
+    if sticks(connector):
+        yield from _sticking(place, law)
+        return
+    if law["phase"] != "undecided":
+        what = f'its phase is "{law["phase"]}", but smooth friction has none'
+        yield Defect(str(place.key("phase")), what, "leave it out: it belongs to a smoothing of 0")
     if (law["static"] is None) != (law["stribeck"] is None):
         yield Defect(str(place), "static friction and the Stribeck speed belong together", "give both, or neither")
     elif law["static"] is not None:
@@ -116,6 +125,51 @@ def _friction(place: Place, connector: HingeFriction) -> Iterator[Defect]:
             yield Defect(str(place), what, "give at least as much")
         elif law["static"] > law["sliding"] and in_range(connector):
             yield from _peak(place, law)
+
+
+def _sticking(place: Place, law: Mapping[str, float]) -> Iterator[Defect]:
+    """Friction that sticks may be static without a Stribeck speed: it then falls to its sliding value at once."""
+    static = law["sliding"] if law["static"] is None else law["static"]
+    if law["static"] is None and law["stribeck"] is not None:
+        yield Defect(str(place), "there is a Stribeck speed, but no static friction", "give both, or leave it out")
+    elif static < law["sliding"]:
+        what = f"static friction {static:g} is below sliding friction {law['sliding']:g}"
+        yield Defect(str(place), what, "give at least as much")
+    elif static == 0.0:
+        yield Defect(str(place), "there is no friction", "give sliding or static friction, or leave the connector out")
+
+
+def friction_that_sticks(scene: s.Scene) -> Iterator[Defect]:
+    """One at most along a coordinate, which nothing prescribes, and names that a run gives to what it adds."""
+    if not any_sticks(scene):
+        return
+    along, paths, added = dict[str, str](), scalar_paths(scene), dict[str, str]()
+    for place, item in sound(scene, "connectors"):
+        if not (isinstance(item, HingeFriction) and sticks(item)):
+            continue
+        try:
+            [friction] = sticking(replace(scene, connectors=(item,)))
+        except ValueError:
+            continue  # another check says so
+        coordinate = friction.coordinate
+        if coordinate in along:
+            what = f'"{along[coordinate]}" sticks along {coordinate} too: how they share a load is undetermined'
+            yield Defect(str(place), what, "add them up in one connector")
+        along.setdefault(coordinate, item.name)
+        [moved] = values_at(scene, paths[coordinate])
+        if item.phase != "sticking" and getattr(moved, moved.KEYS.prescribed) is not None:
+            what = f"{coordinate} is prescribed, so that friction that sticks holds nothing along it"
+            yield Defect(str(place), what, "give it a smoothing speed, or a motor in place of the prescribed motion")
+        sensor = holding_sensor(friction)
+        for spot, other in (*entries(scene, "sensors"), *entries(scene, "controllers")):
+            if other.name == sensor.name and other != sensor:
+                what = f'"{other.name}" is the load by which friction "{item.name}" holds, which a run adds'
+                yield Defect(str(spot.key("name")), what, "rename one of the two")
+        added |= dict.fromkeys(names_of(item.name), item.name)
+    for place, event in entries(scene, "events"):
+        if event.name in added:
+            what = f'"{event.name}" is what a run says of friction "{added[event.name]}"'
+            yield Defect(str(place.key("name")), what, "rename one of the two")
 
 
 def _peak(place: Place, law: Mapping[str, float]) -> Iterator[Doubt]:

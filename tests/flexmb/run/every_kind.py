@@ -24,8 +24,10 @@ from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.jit.cache import KernelCache
 from flexmb.run.simulate_batch import simulate_batch
 from flexmb.run.warm_up import looped, with_panel
+from flexmb.scene.sticking import events_of
 from flexmb.system.algorithms import RUNNING
 from tests.flexmb.closure.mechanisms import windows
+from tests.flexmb.connectors.test_friction_that_sticks import decaying
 from tests.flexmb.control import test_closed_chains as closed_loops
 from tests.flexmb.control.scenes import pendulum, rotor
 from tests.flexmb.control.test_satellite import craft
@@ -61,6 +63,7 @@ def scenes() -> dict[str, tuple[fm.Scene, float]]:
         "a level": (arm(latch("elbow", 1.45)), 0.1),
         "a signal": (ball(floor("height[2]", restitution=0.5)), 0.5),
         "a stop to rest on": (ball(floor("rail.translation", restitution=0.0, rests=True)), 0.5),
+        "friction that sticks": (decaying(), 1.0),
         "a continuous controller": (_loop(CONTINUOUS), 0.02),
         "a sampled controller": (_loop(SAMPLED), 0.12),
         "a law of the user's": (rotor(law), 0.02),
@@ -84,7 +87,7 @@ def methods() -> None:
             given: dict[str, Any] = {"step": t_end / 8.0} if integrator.fixed else ROUGH
             run = fm.simulate(system, t_end, method, samples=5, **given)
             if run.restart is not None and run.stopped_at == t_end:
-                left = run.restart.scene if scene.events else system  # events may have changed it
+                left = run.restart.scene if events_of(run.restart.scene) else system  # events may have changed it
                 fm.simulate(left, 1.5 * t_end, method, samples=3, state=run.restart, **given)
 
 
