@@ -16,7 +16,6 @@ from crosscheck.engines.openness import NOTHING_OPEN, Openness
 from crosscheck.judging.finer_efforts import finer_efforts
 from crosscheck.judging.question import Question, coordinates_of, with_worst_entry
 from crosscheck.judging.results import CaseResults, Result
-from crosscheck.judging.sizes import Sizes
 from crosscheck.judging.uncertainty import Uncertainty
 from crosscheck.judging.verdict import Finding, Signal, Verdict, compare, determined, not_determined, with_open
 from crosscheck.library.case import ComparisonSide
@@ -25,6 +24,7 @@ from crosscheck.library.reference import StoredReference
 from crosscheck.records.kinds import RecordedReference, ReferenceGoals
 from crosscheck.records.packing import unpack
 from flexmb.kept import kept
+from flexmb.run.rounding import Sizes
 from flexmb.typing import Real
 
 NAME = "against the reference"

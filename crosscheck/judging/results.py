@@ -10,17 +10,7 @@ import msgspec
 import numpy as np
 
 from crosscheck.engines.openness import NOTHING_OPEN, Openness
-from crosscheck.judging.sizes import Sizes
-from crosscheck.judging.uncertainty import (
-    RUNGS,
-    RungSignal,
-    Uncertainty,
-    at_rest,
-    estimate,
-    spatial,
-    ulp_of_arithmetic,
-    unknown,
-)
+from crosscheck.judging.uncertainty import RUNGS, RungSignal, Uncertainty, at_rest, estimate, spatial, unknown
 from crosscheck.judging.verdict import Ending, Signal
 from crosscheck.library.channels import is_judged, known_to
 from crosscheck.records.kinds import (
@@ -36,6 +26,7 @@ from crosscheck.records.kinds import (
 from crosscheck.records.packing import Packed, unpack
 from flexmb.kept import kept
 from flexmb.run.channels import signal_range
+from flexmb.run.rounding import Sizes, ulp_of_arithmetic
 from flexmb.typing import Real
 
 AT_REST = 1e-12  # m or rad: what stays within it has not moved
@@ -68,6 +59,10 @@ class Result:
     @kept
     def _sizes(self) -> Sizes:
         return Sizes(tuple(self.finest.channels), self.values)
+
+    def floor(self, channel: str) -> float:
+        """What rounding alone may add to a channel of the finest run (SI)."""
+        return self._sizes.floor(channel, self.finest.evaluations)
 
     @property
     def finest(self) -> RunRecord:

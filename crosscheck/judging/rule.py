@@ -12,9 +12,9 @@ from functools import cache
 
 import numpy as np
 
-from crosscheck.judging.sizes import Sizes
 from crosscheck.judging.uncertainty import RungSignal, Uncertainty, estimate, spatial
 from crosscheck.judging.verdict import Signal, compare, conserve
+from flexmb.run.rounding import Sizes
 from flexmb.typing import Real
 
 CHANNEL = "marker:m.position"

@@ -32,17 +32,7 @@ exceed `LARGEST_ORDER_IN_WORK`, which no method does, U may be less than d_23, w
 by more than a factor `EXCESS_GROWTH`: then the error control reacts to round-off that the scene amplifies. The values
 of these constants were found over the library of cases, see docs/verdicts.md.
 
-**Round-off.** Relative rounding errors of size eps and random sign in N evaluations add up to about eps sqrt(N) times
-the size of the signal (Henrici 1962); systematic growth beyond that shows in the differences. The size is that of the
-largest signal of the same family (all hinge torques, all positions): a backward-stable solve has errors relative to the
-norm of all unknowns. A short run has few evaluations, and then the rounding of the arithmetic that makes a channel of a
-state counts for more, which is the same at all efforts: on its way past n joints a number takes part in `ROUNDINGS` n
-operations. Errors of rounding are spread over +- eps/2, and have at most the variance eps^2/12; their sum is nearly
-normal (Henrici 1962) and is bounded by
-
-    LIKELY sqrt(ROUNDINGS n / 12) eps
-
-times the size: few values in 1e9 are further than six standard deviations off.
+**Round-off.** `flexmb.run.rounding` has the bound that is added to it.
 
 What the condition of a scene makes of rounding is not in it. Where a mass matrix is badly conditioned, or a motion is
 chaotic, the same roundings count for more: a backward-stable algorithm gives the exact result of a scene whose numbers
@@ -68,11 +58,11 @@ from itertools import pairwise
 import numpy as np
 
 from flexmb.run.channels import distance
+from flexmb.run.rounding import roundoff_floor
 from flexmb.typing import Real
 
 SAFETY = 1.25
 UNPROVEN_SAFETY = 3.0
-MOST_COUNTED = 2**63  # evaluations: a record may contain larger integers, which NumPy cannot represent
 RUNGS = 4  # the most efforts of a ladder that are used
 ORDER_BAND = 0.1
 SCATTER = 10.0
@@ -83,8 +73,6 @@ NO_GROWTH = 1.03  # ratio of the evaluations at two tolerances
 EXCESS_GROWTH = 1.5  # ratio of the logarithm of that ratio to the one expected from the coarser pair
 ORDER_CREDIT = 4.0
 LARGEST_ORDER = 16.0
-ROUNDINGS = 17  # an entry of a joint's rotation 3, composed with the one before 5, an arm turned 5, added 1, a moment 3
-LIKELY = 6.0  # standard deviations
 LARGEST_RATIO = 1e6  # of two steps between which an order is estimated
 
 
@@ -168,17 +156,6 @@ def _enveloped(factor: float, gap: Real, floor: float, how: str, order: float | 
     if not np.all(np.isfinite(envelope)):
         return unknown(len(envelope), "the runs are so far apart that their distance is not finite")
     return Uncertainty(envelope, float(envelope[-1]), how, order)
-
-
-def roundoff_floor(size: float, evaluations: int, joints: int = 0) -> float:
-    """eps sqrt(N) times the size of the signals, and the rounding of arithmetic that passes so many joints."""
-    in_steps = np.sqrt(float(min(evaluations, MOST_COUNTED)))
-    return float(np.finfo(np.float64).eps * (in_steps + ulp_of_arithmetic(joints)) * size)
-
-
-def ulp_of_arithmetic(joints: int) -> float:
-    """By how many units in the last place the rounding of arithmetic that passes so many joints is likely bounded."""
-    return float(LIKELY * np.sqrt(ROUNDINGS * joints / 12.0))
 
 
 def spatial(channel: str, coarse: Real, fine: Real, ratio: float, order: float) -> Real:

@@ -19,7 +19,6 @@ from crosscheck.engines.trajectories import signals_of
 from crosscheck.judging.against_reference import ReferenceSignals, at_samples, hold, of_record, shared_times
 from crosscheck.judging.case_verdicts import judge
 from crosscheck.judging.results import CaseResults, Result, collect
-from crosscheck.judging.uncertainty import roundoff_floor
 from crosscheck.judging.verdict import Signal, Verdict, compare
 from crosscheck.library.channels import most_specific
 from crosscheck.library.find import Case
@@ -37,6 +36,7 @@ from crosscheck.running.sweep import Listener, run_planned
 from flexmb.kept import kept
 from flexmb.output.files import take_away, write_whole
 from flexmb.run.channels import distance, family, magnitude
+from flexmb.run.rounding import roundoff_floor
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 

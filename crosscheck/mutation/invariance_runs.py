@@ -16,7 +16,7 @@ import numpy as np
 from crosscheck.engines.checked import NO_START
 from crosscheck.engines.registry import PROVIDER
 from crosscheck.judging.results import CaseResults, Result, collect
-from crosscheck.judging.uncertainty import Uncertainty, roundoff_floor
+from crosscheck.judging.uncertainty import Uncertainty
 from crosscheck.judging.verdict import Finding, Signal, Status, compare
 from crosscheck.library.channels import LINEAR_KINDS, is_judged, most_specific
 from crosscheck.library.find import Case
@@ -32,6 +32,7 @@ from crosscheck.running.scheduler import BY_DEFAULT, Limits
 from crosscheck.running.sweep import Listener, run_planned
 from flexmb.output.files import take_away, write_whole
 from flexmb.run.channels import magnitude
+from flexmb.run.rounding import roundoff_floor
 from flexmb.scene.check import check_scene
 
 RECORDS = "invariances.jsonl"

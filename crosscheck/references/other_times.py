@@ -14,7 +14,6 @@ import msgspec
 import numpy as np
 
 from crosscheck.judging.against_reference import CLOCK
-from crosscheck.judging.sizes import Sizes
 from crosscheck.judging.uncertainty import Uncertainty
 from crosscheck.judging.verdict import Signal
 from crosscheck.library.case import CaseError
@@ -24,6 +23,7 @@ from crosscheck.library.reference import StoredReference
 from crosscheck.references.routes import RouteSignals, run_routes
 from crosscheck.running.scheduler import BY_DEFAULT, Scheduler
 from flexmb.run.channels import distance
+from flexmb.run.rounding import Sizes
 from flexmb.typing import Real
 
 

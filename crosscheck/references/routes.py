@@ -15,7 +15,7 @@ import msgspec
 import numpy as np
 
 from crosscheck.judging.results import Result, collect
-from crosscheck.judging.uncertainty import Uncertainty, roundoff_floor
+from crosscheck.judging.uncertainty import Uncertainty
 from crosscheck.library import basis
 from crosscheck.library.case import CaseError, Comparison, ComparisonSide, Variant
 from crosscheck.library.code import function_of
@@ -29,6 +29,7 @@ from crosscheck.running.plan import jobs_at, plan
 from crosscheck.running.scheduler import Limits, Scheduler
 from crosscheck.running.sweep import Listener, run_planned
 from flexmb.run.channels import family, magnitude, matches
+from flexmb.run.rounding import roundoff_floor
 from flexmb.typing import Real
 
 

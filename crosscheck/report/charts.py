@@ -20,13 +20,13 @@ from crosscheck.library.channels import CONSERVED, KINDS
 from crosscheck.report.animation import animations
 from crosscheck.report.workprecision import WorkPrecision, work_precision
 from flexmb.output.printable import printable
-from flexmb.run.channels import distance, family, magnitude, matches, norms, signal_range, unit
+from flexmb.run.channels import distance, family, matches, norms, signal_range, unit
 from flexmb.typing import Real
 from flexmb.view.store import Store
 
 COMPONENTS = {1: [""], 2: ["1", "2"], 3: ["x", "y", "z"], 4: ["w", "x", "y", "z"]}
 RUNAWAY = 20.0  # ratio of two signals beyond which the larger one does not determine the scale
-ROUNDING = 1e-12  # part of the largest channel of a panel: what is smaller is drawn as zero
+STRAIGHT = 100.0  # limits of a channel that is zero but for rounding, over the bound of that
 STILL, BAND = 1e-3, 0.05  # a signal whose range is below this part of its size counts as constant; its drawn band
 
 
@@ -55,7 +55,6 @@ def _panels(store: Store, case: CaseResults, verdicts: list[Verdict]) -> list[di
             chosen = {key: value for key, value in channels.items() if family(key).partition(".")[0] == kind.name}
             if chosen and kind.panel:
                 views = [_channel(store, case, channel, pairs) for channel, pairs in chosen.items()]
-                _without_rounding(views)
                 whose = {"comparison": printable(name), "title": kind.panel}
                 panels.append({**whose, "channels": views, "first": _first(views)})
     return panels
@@ -104,9 +103,8 @@ def _channel(store: Store, case: CaseResults, channel: str, pairs: list[Verdict]
         "unit": unit(channel),
         "components": ["norm"] if channel in SYMBOL else [names[i] for i in np.flatnonzero(drawn)],
         "size": min(signal_range(channel, result.values(channel)) for result in sides.values()),
-        "magnitude": max(magnitude(channel, result.values(channel)) for result in sides.values()),
         "events": sorted({t for result in sides.values() for _, t in result.finest.events}),
-        "range": _shown_range(list(curves.values())),
+        "range": _shown_range(list(curves.values()), max(result.floor(channel) for result in sides.values())),
         "sides": [
             {
                 "label": _label(result, several),
@@ -138,32 +136,21 @@ def _pair(store: Store, case: CaseResults, channel: str, verdict: Verdict) -> di
     }
 
 
-def _shown_range(signals: list[Real]) -> list[float] | None:
+def _shown_range(signals: list[Real], rounding: float) -> list[float] | None:
     """Limits of the drawing if the automatic ones would be misleading, else None.
 
-    If one signal is much larger: twice the smallest signal. If all are constant: a band about them, not their
-    round-off."""
+    If all signals are within the `rounding` of their arithmetic: limits between which they are straight lines. If one
+    is much larger: twice the smallest signal. If all are constant: a band about them, not their round-off."""
     sizes = [float(np.max(np.abs(values))) for values in signals]
     smallest, largest = min(sizes), max(sizes)
+    if 0.0 < largest <= rounding:
+        return [-STRAIGHT * rounding, STRAIGHT * rounding]
     if 0.0 < smallest < largest / RUNAWAY:
         return [-2.0 * smallest, 2.0 * smallest]
     low, high = min(float(np.min(values)) for values in signals), max(float(np.max(values)) for values in signals)
     if high - low < STILL * largest:
         return [low - BAND * largest, high + BAND * largest]
     return None
-
-
-def _without_rounding(views: list[dict[str, Any]]) -> None:
-    """Channels of a panel that stay below the rounding of its largest one get limits between which they are straight.
-
-    A torque is a force times lengths of about a metre, a speed a rate times such lengths.
-    """
-    sizes = [view.pop("magnitude") for view in views]
-    turned = [view["name"].endswith(".orientation") for view in views]  # of size 1 whatever moves
-    least = ROUNDING * max((size for size, is_turned in zip(sizes, turned, strict=True) if not is_turned), default=0.0)
-    for view, size in zip(views, sizes, strict=True):
-        if 0.0 < size <= least:
-            view["range"] = [-least, least]
 
 
 def _drifts(store: Store, case: CaseResults) -> list[dict[str, Any]]:

@@ -11,10 +11,11 @@ from crosscheck.report.html import INDEX, embedded, places, templates
 from crosscheck.report.site import FOLDER, SINGLE, asset_files, clear_site, write_pages
 from crosscheck.validation.budget import Budget, document
 from flexmb.output.files import write_whole
+from flexmb.view.page import PLOTLY
 
 RESULTS = "validation.json"
-SCRIPTS = ("unpack.js", "data.js", "charts.js", "page.js", "measured.js")
-LIBRARIES = ("plotly/plotly-basic.min.js",)
+SCRIPTS = ("unpack.js", "data.js", "plotting.js", "charts.js", "page.js", "measured.js")
+LIBRARIES = (PLOTLY,)
 NO_SERIES = {"shapes": [], "data": ""}  # the readings are few, and are not packed
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -27,14 +26,14 @@ from crosscheck.report.mutations import Scores
 from crosscheck.report.overview import findings, matrix
 from crosscheck.report.speed import LEVELS, speed_view
 from flexmb.output.files import folder, write_whole
-from flexmb.view.page import THREE, asset
+from flexmb.view.page import PLOTLY, THREE, asset
 
 FOLDER = "report"
 SINGLE = "report.html"
 ASSETS = "assets"
 LISTING = f"{ASSETS}/pages.json"  # the files of the report, which the next report removes
-SCRIPTS = ("unpack.js", "data.js", "charts.js", "scene.js", "page.js", "index.js", "speed.js")
-LIBRARIES = ("plotly/plotly-basic.min.js", THREE)  # loaded when first needed
+SCRIPTS = ("unpack.js", "data.js", "plotting.js", "charts.js", "scene.js", "page.js", "index.js", "speed.js")
+LIBRARIES = (PLOTLY, THREE)  # loaded when first needed
 
 
 @dataclass(frozen=True)
@@ -77,7 +76,7 @@ def write_single(material: Material, out: Path) -> Path:
         inline=True,
         cases=[_view(case, material, where[case.case.case]) for case in cases],
         style=style(),
-        scripts=[*(Markup(_library(name)) for name in LIBRARIES), *map(source, SCRIPTS)],
+        scripts=[*(Markup(asset(name)) for name in LIBRARIES), *map(source, SCRIPTS)],
         data=[Markup(_registration(case, material, where[case.case.case])) for case in cases],
     )
     write_whole(out / SINGLE, _encoded(text))
@@ -95,7 +94,7 @@ def write_unfinished(outcome: SessionOutcome, out: Path) -> None:
 def asset_files(scripts: Iterable[str], libraries: Iterable[str]) -> dict[str, str]:
     """The style sheet, scripts and libraries of a folder of pages, by their names in it."""
     written = {f"{ASSETS}/style.css": str(style())} | {f"{ASSETS}/{name}": str(source(name)) for name in scripts}
-    return written | {f"{ASSETS}/{Path(name).name}": _library(name) for name in libraries}
+    return written | {f"{ASSETS}/{Path(name).name}": asset(name) for name in libraries}
 
 
 def write_pages(site: Path, pages: Mapping[str, str]) -> None:
@@ -143,12 +142,6 @@ def _registration(case: CaseResults, material: Material, place: CasePlace) -> st
     """A script that passes the case's data to the page."""
     data = payload(case, material.outcome.verdicts[case.case.case])
     return f"crosscheck.register({embedded(place.anchor)}, {embedded(data)});\n"
-
-
-def _library(name: str) -> str:
-    if name == THREE:
-        return asset(name)
-    return files("crosscheck.report").joinpath("vendor", name).read_text(encoding="utf-8")
 
 
 def clear_site(site: Path) -> bool:

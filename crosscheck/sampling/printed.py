@@ -30,13 +30,14 @@ from tomlkit.items import Float
 from crosscheck.engines.contract import Run
 from crosscheck.engines.registry import engine
 from crosscheck.engines.trajectories import signals_of
-from crosscheck.judging.sizes import Sizes, size_of
+from crosscheck.judging.sizes import size_of
 from crosscheck.library.case import CaseError, Variant
 from crosscheck.library.channels import most_specific
 from crosscheck.library.find import Case
 from crosscheck.running.plan import prescribed, sample_times, variant_scene
 from flexmb.output.files import write_whole
 from flexmb.run.channels import distance, family, signal_range
+from flexmb.run.rounding import Sizes
 from flexmb.scene.check import check_scene
 from flexmb.scene.files import load_scene
 from flexmb.scene.reading import read_text

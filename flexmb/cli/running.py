@@ -53,15 +53,18 @@ RestartFile = Annotated[
 Folder = Annotated[Path, Option("--out", "-o", help="Folder for trajectory.csv and charts.")]
 Also = Annotated[
     list[str] | None,
-    Option(help="In addition to the CSV: `npz`, `parquet`, or `rrd` for the viewer rerun; may be repeated."),
+    Option(help="Beside the CSV: `npz`, `parquet`, `rrd` for the viewer rerun, `html` for charts; may be repeated."),
 ]
 Envelope = Annotated[
-    bool,
+    bool | None,
     Option(
-        "--envelope",
-        help="Follow the run again over all of its steps; print the peaks of loads, write envelope.csv.",
+        "--envelope/--no-envelope",
+        help="Follow the run again over all of its steps for the peaks of loads, and write envelope.csv. By default "
+        "short runs are followed for the table of peaks alone.",
+        show_default=False,
     ),
 ]
+Quiet = Annotated[bool, Option("--quiet", "-q", help="Print the names of the files that are written, and errors.")]
 Plots = Annotated[bool, Option("--plots/--no-plots", help="Write charts beside the CSV.")]
 Sections = Annotated[
     list[str] | None,
@@ -72,10 +75,11 @@ ErrorEstimate = Annotated[
 ]
 
 
-FORMATS = {"npz": "to_npz", "parquet": "to_parquet", "rrd": "to_rerun"}
+FORMATS = {"npz": "to_npz", "parquet": "to_parquet", "rrd": "to_rerun", "html": "plot"}
 """Endings, and the methods of a trajectory that write them."""
 
 ENVELOPE = "envelope.csv"
+SHORT = 2_000_000  # numbers of states that a run has evaluated: it is then followed over its steps in about a second
 SECTIONS = 21  # equally spaced, where no positions are given
 
 
@@ -93,16 +97,17 @@ def simulate(
     restart: RestartFile = None,
     samples: Samples = 201,
     algorithm: AlgorithmName = "articulated",
-    envelope: Envelope = False,
+    envelope: Envelope = None,
     also: Also = None,
     plots: Plots = True,
     sections: Sections = None,
     error: ErrorEstimate = False,
     strict: Strict = False,
+    quiet: Quiet = False,
     no_user_code: NoUserCode = False,
 ) -> None:
     """
-    Simulate a scene; write `trajectory.csv`, `restart.npz` and charts; print a summary.
+    Simulate a scene; write `trajectory.csv`, `restart.npz` and charts; print a summary and where loads have peaks.
 
     **Examples**
 
@@ -134,11 +139,13 @@ def simulate(
         }  # fmt: skip
         with console.status(Text(f"simulating {scene} (the first run after an update compiles)")):
             trajectory, interrupted = _run(scene, t_end, values or (), restart, settings)
-        _report(trajectory, out, also or (), plots, wanted)
+        _report(trajectory, out, also or (), plots, wanted, quiet)
         if envelope and not interrupted:
-            _find_envelope(trajectory, out / ENVELOPE)
+            _write_envelope(trajectory, out / ENVELOPE)
         if error and not interrupted:
             _estimate_error(trajectory)
+        if not quiet and len(trajectory.t):
+            _tell_peaks(trajectory, followed=False if interrupted else envelope)
     if interrupted:
         raise typer.Exit(EXIT_INTERRUPTED)
     if not trajectory.finished:
@@ -170,13 +177,14 @@ def _run(
 
 
 def _report(
-    trajectory: Trajectory, out: Path, also: Sequence[str], plots: bool, sections: dict[str, list[float]]
+    trajectory: Trajectory, out: Path, also: Sequence[str], plots: bool, sections: dict[str, list[float]], quiet: bool
 ) -> None:
     """Print the summary first, since a full disk then costs the files only; write the files, section loads last."""
     from flexmb.run.exports import write_sections
     from flexmb.run.summary import summary
 
-    console.print(summary(trajectory))
+    if not quiet:
+        console.print(summary(trajectory))
     written = _written(trajectory, out, also, plots)
     console.print("wrote", ", ".join(str(path) for path in written), soft_wrap=True)
     for name, x in sections.items():
@@ -185,15 +193,31 @@ def _report(
         console.print("wrote", str(path), soft_wrap=True)
 
 
-def _find_envelope(trajectory: Trajectory, path: Path) -> None:
-    from flexmb.run.summary import peaks_table
-
+def _write_envelope(trajectory: Trajectory, path: Path) -> None:
     with console.status(Text("following the run over all of its steps")):
         envelope = trajectory.envelope
-    console.print(peaks_table(trajectory, envelope))
     with whole_file(path) as beside:
         envelope.to_csv(beside)
     console.print("wrote", str(path), soft_wrap=True)
+
+
+def _tell_peaks(trajectory: Trajectory, followed: bool | None) -> None:
+    """Print the peaks of loads over all steps if the run was followed, or is short; else those of the output times."""
+    from flexmb.run.summary import peaks_table
+
+    sampled = f"the {len(trajectory.t)} output times"
+    if followed is None:
+        states = trajectory.statistics.evaluations * (len(trajectory.q_names) + len(trajectory.u_names))
+        followed, why = states <= SHORT, "; --envelope finds those between"
+    else:
+        why = ""
+    if followed:
+        try:
+            console.print(peaks_table(trajectory, trajectory.envelope))
+            return
+        except ArithmeticError as error:  # the run itself has ended well
+            why = f": {error}"
+    console.print(peaks_table(trajectory, trajectory.sampled_envelope, sampled + why))
 
 
 def _estimate_error(trajectory: Trajectory) -> None:

@@ -43,7 +43,7 @@ def view(
     """
     with no_traceback():
         from flexmb.scene.files import load_scene
-        from flexmb.view.scene_view import html_file
+        from flexmb.view.page import html_file
 
         if t_end is not None and mode is not None:
             raise ValueError("--t-end and --mode exclude each other: a page shows a run or a mode")

@@ -9,17 +9,20 @@ import numpy as np
 from rich.text import Text
 
 from flexmb.output.listing import Listing, figures, names, prose
-from flexmb.run.channels import channels_of, norms, signal_range, unit
-from flexmb.run.envelope import Envelope
+from flexmb.run.channels import channels_of, signal_range, unit
+from flexmb.run.envelope import Envelope, Extremes, part_of_extremes
+from flexmb.run.rounding import Floors
+from flexmb.run.run_arrays import Kind, labels
 from flexmb.run.trajectory import Trajectory
+from flexmb.system.observables import open_components
 from flexmb.typing import Real
 
 MOST_EVENTS = 8  # number of events that are listed
-_LOADS = "load", "total_load", "wheel_load", "connector"
+MOST_PEAKS = 12  # rows of the table of peaks
 
 
 def summary(trajectory: Trajectory) -> Listing:
-    """Status, largest loads at the output times, drift of energy and momentum, steps, and where the time went."""
+    """Status, drift of energy and momentum, steps, and where the time went."""
     table = Listing(*names(""), *prose(""))
     for name, value in _rows(trajectory):
         table.add(Text(name, style="dim"), value)
@@ -42,63 +45,78 @@ def errors_table(trajectory: Trajectory, errors: Mapping[str, Real]) -> Listing:
     return table
 
 
-def peaks_table(trajectory: Trajectory, envelope: Envelope) -> Listing:
-    """The largest load, drive and hinge force of each hinge, over all steps and at the output times."""
+def peaks_table(trajectory: Trajectory, envelope: Envelope, over: str = "all steps") -> Listing:
+    """The greatest component of torque and force across each hinge, wheel, closure and connector, and of each drive,
+    with its sign and when it occurs. `over`: what the envelope is of, in words."""
+    found = _peaks(trajectory, envelope)
+    peaks = sorted((peak for peak in found if peak.is_signal), key=lambda peak: -peak.share)[:MOST_PEAKS]
+    zero = [peak.name for peak in found if not peak.is_signal]
+    left = len(found) - len(zero) - len(peaks)
+    notes = [
+        f"smaller, left out: {left}" if left else "",
+        f"zero but for rounding: {', '.join(zero[:MOST_PEAKS])}" if zero else "",
+        f"and {len(zero) - MOST_PEAKS} more" if len(zero) > MOST_PEAKS else "",
+        f"not determined: {open_components(trajectory.undetermined)}" if trajectory.undetermined else "",
+    ]
     table = Listing(
-        *names("channel"), *figures("largest", "at", "output times"), title="\nPeaks over all steps",
-        caption="Output times: the largest value at these alone, which the files hold.",
+        *names("component"), *figures("peak", "at"), title=f"\nPeaks of loads over {over}",
+        caption="; ".join(note for note in notes if note),
     )  # fmt: skip
-    for name, found in _peaks(trajectory, envelope).items():
-        table.add(name, f"{found.size:.6g} {unit(name)}", f"{found.t:.6g} s", f"{found.sampled:.6g}")
+    for peak in found:
+        if peak in peaks:
+            table.add(peak.name, f"{peak.value:.6g} {peak.unit}", f"{peak.t:.6g} s")
     return table
 
 
 class Peak(NamedTuple):
-    """The largest absolute value or magnitude of a channel, when (s), and the largest one at the output times."""
+    """The value of largest size of a scalar, as envelope.csv names it, and when (s); `share`: of the largest of its
+    kind; is_signal: whether it is more than rounding."""
 
-    size: float
+    name: str
+    unit: str
+    value: float
     t: float
-    sampled: float
+    share: float
+    is_signal: bool
 
 
-def _peaks(trajectory: Trajectory, envelope: Envelope) -> dict[str, Peak]:
-    """By channel, of what loads a structure."""
-    peaks = {}
-    for name, values in channels_of(trajectory).items():
-        kind, _, of = name.partition(":")
-        if name in envelope.magnitudes and kind in _LOADS:
-            magnitude = envelope.magnitudes[name]
-            peaks[name] = Peak(float(magnitude.greatest[0]), float(magnitude.t_greatest[0]), _largest(values))
-        elif kind in ("drive", "hinge_force"):
-            magnitude = (envelope.drives if kind == "drive" else envelope.hinge_forces)[of]
-            for i, size in enumerate(magnitude.largest):
-                t = magnitude.t_greatest[i] if magnitude.greatest[i] == size else magnitude.t_least[i]
-                label = name if len(magnitude.largest) == 1 else f"{name}[{i}]"
-                peaks[label] = Peak(float(size), float(t), _largest(values[:, i : i + 1]))
+def _peaks(trajectory: Trajectory, envelope: Envelope) -> list[Peak]:
+    """Of all that loads a structure, in the order of the run's columns: of a vector its greatest component."""
+    channels = channels_of(trajectory)
+    floors = Floors(channels, trajectory.statistics.evaluations)
+    groups: list[tuple[str, str, list[tuple[str, str]], Extremes]] = []
+    kinds: tuple[tuple[Kind, str], ...] = (
+        ("loads", "load"), ("total_loads", "total_load"), ("wheel_loads", "wheel_load"), ("connectors", "connector"),
+        ("drives", "drive"), ("hinge_forces", "hinge_force"),
+    )  # fmt: skip
+    for kind, prefix in kinds:
+        for item, extremes in getattr(envelope, kind).items():
+            named = labels(kind, item, len(extremes.least), trajectory)
+            if kind in ("drives", "hinge_forces"):
+                scalars = enumerate(named)
+                groups += [(prefix, f"{prefix}:{item}", [one], _part(extremes, i, i + 1)) for i, one in scalars]
+                continue
+            for start, part in ((0, "torque"), (3, "force")):
+                channel = f"{prefix}:{item}.{part}"
+                groups.append((part, channel, named[start : start + 3], _part(extremes, start, start + 3)))
+    sizes = [float(np.nanmax(found.largest, initial=0.0)) for *_, found in groups]
+    most = {of: max(size for (other, *_), size in zip(groups, sizes, strict=True) if other == of) for of, *_ in groups}
+    peaks = []
+    for (of, channel, named, found), size in zip(groups, sizes, strict=True):
+        if np.all(np.isnan(found.largest)):
+            continue  # it is named as not determined
+        i = int(np.nanargmax(found.largest))
+        is_top = found.greatest[i] == found.largest[i]
+        value, t = (found.greatest, found.t_greatest) if is_top else (found.least, found.t_least)
+        is_signal = size > floors.of(channel)
+        share = size / (most[of] or 1.0)
+        name = named[i][0] if is_signal or len(named) == 1 else named[i][0].rpartition(".")[0]
+        peaks.append(Peak(name, named[i][1], float(value[i]), float(t[i]), share, is_signal))
     return peaks
 
 
-def _largest(values: Real) -> float:
-    """The largest norm of rows, NaN if none is known."""
-    sizes = norms(values)
-    return float(np.nanmax(sizes)) if np.isfinite(sizes).any() else float("nan")
-
-
-def _loads(trajectory: Trajectory) -> list[tuple[str, str]]:
-    """The largest torque and force of all, which are values at output times and no peaks."""
-    told = []
-    for part in ("torque", "force"):
-        sizes = {
-            name: _largest(values)
-            for name, values in channels_of(trajectory).items()
-            if name.partition(":")[0] in _LOADS and name.endswith(f".{part}")
-        }
-        known = {name: size for name, size in sizes.items() if size > 0.0}  # not NaN either
-        if known:
-            name = max(known, key=known.__getitem__)
-            told.append(f"{known[name]:.6g} {unit(name)} ({name})")
-    at = f"at the {len(trajectory.t)} output times; --envelope (Trajectory.envelope) finds the peaks over all steps"
-    return [("largest loads", f"{', '.join(told)} {at}")] if told else []
+def _part(extremes: Extremes, start: int, stop: int) -> Extremes:
+    return part_of_extremes(extremes, slice(start, stop))
 
 
 def _rows(trajectory: Trajectory) -> list[tuple[str, Text | str]]:
@@ -111,11 +129,10 @@ def _rows(trajectory: Trajectory) -> list[tuple[str, Text | str]]:
         ("output", f"{len(trajectory.t)} times, {len(trajectory.markers)} markers, {len(trajectory.loads)} hinges"),
     ]
     if trajectory.undetermined:
-        rows.append(("not determined", _undetermined(trajectory)))
+        rows.append(("not determined", open_components(trajectory.undetermined)))
     if trajectory.events:
         rows.append(("events", _events(trajectory)))
     if len(trajectory.t):
-        rows += _loads(trajectory)
         rows += [("energy drift", _energy(trajectory)), *_momentum(trajectory)]
     by = "" if trajectory.made_by is None else f", by {trajectory.made_by.system.kernels} kernels"
     return [
@@ -123,16 +140,6 @@ def _rows(trajectory: Trajectory) -> list[tuple[str, Text | str]]:
         ("steps", steps),
         ("time", f"{cost.compile_s:.2f} s compile, {cost.run_s:.4f} s run{by}, {cost.output_s:.2f} s output"),
     ]
-
-
-def _undetermined(trajectory: Trajectory) -> str:
-    """Components of loads that redundant closures leave undetermined, as "pin (torque x, y; force z)"."""
-    names = []
-    for name, is_open in trajectory.undetermined.items():
-        letters = [[axis for axis, is_axis in zip("xyz", is_open[i : i + 3], strict=False) if is_axis] for i in (0, 3)]
-        parts = [f"{part} {', '.join(axes)}" for part, axes in zip(("torque", "force"), letters, strict=True) if axes]
-        names.append(f"{name} ({'; '.join(parts)})" if name in trajectory.loads else name)
-    return ", ".join(names)
 
 
 def _events(trajectory: Trajectory) -> str:

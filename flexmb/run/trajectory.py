@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any, get_args, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
+    from flexmb.view.charting import ChartPage
     from flexmb.view.scene_view import View
 
 
@@ -85,7 +86,18 @@ class Trajectory(RunArrays):
         if not self._is_followed:
             raise ValueError("the envelope needs a trajectory as simulate made it: use the trajectory of each run")
         parts = [part for way in self.ways for part in way.parts(way.until)]
-        return envelope(self, [part_of(self, np.zeros((0, 2), np.int64)), *parts])
+        return envelope(self, [part_of(self, NO_PANELS), *parts])
+
+    @property
+    def sampled_envelope(self) -> Envelope:
+        """The same at the output times alone, which costs nothing: peaks between them are missed.
+
+        ValueError for a trajectory without output times.
+        """
+        refuse_torn(self)
+        if not len(self.t):
+            raise ValueError("the run has no output times, and so no least and greatest values")
+        return envelope(self, [part_of(self, NO_PANELS)])
 
     @property
     def _is_followed(self) -> bool:
@@ -225,7 +237,8 @@ class Trajectory(RunArrays):
         wheels, point masses, connectors, hinges, trails of markers, and arrows of the loads at hinges and closures.
         ValueError for a trajectory that `simulate` has not made, and for a path that does not end in .html.
         """
-        from flexmb.view.scene_view import html_file, scene_view  # here, because most runs are not drawn
+        from flexmb.view.page import html_file
+        from flexmb.view.scene_view import scene_view  # here, because most runs are not drawn
 
         made_by = self._making("a view")
         file = None if path is None else html_file(path)
@@ -236,14 +249,38 @@ class Trajectory(RunArrays):
             view.save(file)
         return view
 
-    def plot(self, folder: str | os.PathLike[str]) -> list[Path]:
-        """Write charts of markers, energy, loads and drives to `folder` as PNG; returns their paths."""
-        from flexmb.run.plots import write_plots  # imported here because matplotlib is slow to import
+    @overload
+    def plot(self) -> ChartPage: ...
+
+    @overload
+    def plot(self, path: str | os.PathLike[str]) -> list[Path]: ...
+
+    def plot(self, path: str | os.PathLike[str] | None = None) -> ChartPage | list[Path]:
+        """Charts of markers, energy, momentum, loads and drives, by components with signs, with events marked.
+
+            run.plot()                 in a notebook, as the last value of a cell: charts to zoom and to read
+            run.plot("charts.html")    writes them as one page that needs no network
+            run.plot("folder")         writes them as PNG files
+
+        Returns the page, or the paths of what was written. What is below the rounding of a channel's arithmetic is
+        drawn as zero: see `flexmb.run.charts`. Loads that the motion does not determine are named, and not drawn.
+        """
+        from flexmb.run.charts import charts_of  # here, because most runs are not drawn
+        from flexmb.view.charting import chart_page
+        from flexmb.view.page import is_html
 
         refuse_torn(self)
-        return write_plots(self, Path(folder))
+        drawn = charts_of(self)
+        if path is None:
+            return chart_page(self.scene, drawn)
+        if is_html(path):
+            return [chart_page(self.scene, drawn).save(path)]
+        from flexmb.run.plots import write_plots  # here, because matplotlib is slow to import
+
+        return write_plots(drawn, Path(path))
 
 
+NO_PANELS = np.zeros((0, 2), np.int64)
 ROTATIONS = 100_000  # of markers that become quaternions together, which takes four times their memory
 
 

@@ -78,6 +78,16 @@ def undetermined_loads(loads: Mapping[str, Real], drives: Mapping[str, Real]) ->
     return {name: flags for name, flags in open_.items() if np.any(flags)}
 
 
+def open_components(undetermined: Mapping[str, NDArray[np.bool_]]) -> str:
+    """Components of loads that `undetermined_loads` lists, in words: "pin (torque x, y; force z), lid.drive"."""
+    told = []
+    for name, is_open in undetermined.items():
+        letters = [[axis for axis, is_axis in zip("xyz", is_open[i : i + 3], strict=False) if is_axis] for i in (0, 3)]
+        parts = [f"{part} {', '.join(axes)}" for part, axes in zip(("torque", "force"), letters, strict=True) if axes]
+        told.append(f"{name} ({'; '.join(parts)})" if len(is_open) == 6 else name)
+    return ", ".join(told)
+
+
 @dataclass(frozen=True)
 class Names:
     """Names of the observed quantities, in the order of the arrays.

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from html import escape
-from pathlib import Path
 
 import msgspec
 import numpy as np
 
 from flexmb.interchange.sid.to_body import with_sid_bodies
-from flexmb.output.files import folder, write_whole
 from flexmb.scene.bodies import ZERO
 from flexmb.scene.quaternions import quaternion_of
 from flexmb.scene.schema import Scene
@@ -23,44 +18,20 @@ from flexmb.typing import Real
 from flexmb.view.draw import draw
 from flexmb.view.drawing import CarriedPoint, Drawing, Line, carried_line, carried_wheel, carriers
 from flexmb.view.film import marked
-from flexmb.view.page import page
+from flexmb.view.page import Page, page
 from flexmb.view.store import Store
 from flexmb.view.store import chosen as sampled
 
-HEIGHT = 620  # pixels of a notebook's frame
 Loads = Mapping[str, Real]
 
 
-@dataclass(frozen=True)
-class View:
+class View(Page):
     """An animation of a scene as one HTML page, which needs no network: `save` it, or show it as the last value of a
     notebook's cell. `scene` is the name of the scene, `html` the page."""
 
-    scene: str
-    html: str
-
-    def __repr__(self) -> str:
-        return f"<View of {self.scene!r}: one page of {len(self.html) / 1e6:.1f} MB; save(path) writes it>"
-
-    def _repr_html_(self) -> str:
-        """The page in a frame of its own, for notebooks."""
-        source = escape(self.html, quote=True)
-        return f'<iframe srcdoc="{source}" style="width:100%;height:{HEIGHT}px;border:0" title="scene"></iframe>'
-
-    def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write the page, which ends in .html; returns its path. ValueError for another ending."""
-        file = html_file(path)
-        folder(file.parent)
-        write_whole(file, self.html)
-        return file
-
-
-def html_file(path: str | os.PathLike[str]) -> Path:
-    """The path of a page; ValueError if it does not end in .html."""
-    file = Path(path)
-    if file.suffix.lower() not in (".html", ".htm"):
-        raise ValueError(f"a view is a page of HTML, not {file.name!r}: give a name that ends in .html")
-    return file
+    @property
+    def kind(self) -> str:
+        return "View"
 
 
 class _Filmed:

@@ -31,6 +31,10 @@ class Store:
     def times(self, times: Real) -> int:
         return self._add(times[chosen(len(times))])
 
+    def whole(self, values: Real) -> int:
+        """Number of all values (T, k) or (T,)."""
+        return self._add(values)
+
     def samples(self, values: Real) -> int:
         """Number of thinned values (T, k) or (T,)."""
         return self._add(values[chosen(len(values))])

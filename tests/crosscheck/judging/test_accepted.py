@@ -33,6 +33,7 @@ from crosscheck.report import junit
 from crosscheck.report.ci import write_summary
 from crosscheck.report.junit import write_junit
 from crosscheck.running.plan import prescribed, sample_times, scene_basis, variant_scene
+from flexmb.run import rounding
 from tests.crosscheck.made_records import ONE_PAIR, TIP, judged, ladder, single, way
 from tests.crosscheck.sessions import copy_case, shipped, sweep_here
 
@@ -190,7 +191,8 @@ def test_a_figure_without_a_basis_is_held_against_as_it_always_was(own: None) ->
             "SAFETY", "UNPROVEN_SAFETY", "ORDER_BAND", "SCATTER", "UNCONTROLLED_SAFETY", "SAME_ORDER",
             "LARGEST_ORDER_IN_WORK", "NO_GROWTH", "EXCESS_GROWTH", "ORDER_CREDIT",
         )),
-        (sizes, "LEAST_OF_SCENE"), (sizes, "LEAST_OF_FAMILY"),
+        (sizes, "LEAST_OF_SCENE"), (sizes, "LEAST_OF_FAMILY"), (rounding, "LEAST_OF_SCENE"), (rounding, "ROUNDINGS"),
+        (rounding, "LIKELY"),
     ],
 )  # fmt: skip
 @pytest.mark.filterwarnings("ignore:overflow encountered:RuntimeWarning")  # of exponents a million times larger

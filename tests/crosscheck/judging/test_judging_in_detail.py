@@ -8,11 +8,12 @@ from crosscheck.judging.case_verdicts import judge
 from crosscheck.judging.figures import figures, recordable
 from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.judging.results import CaseResults, Result, collect
-from crosscheck.judging.sizes import Sizes, size_of
+from crosscheck.judging.sizes import size_of
 from crosscheck.judging.uncertainty import Uncertainty, spatial
 from crosscheck.judging.verdict import Finding, Signal, Verdict, compare, conserve
 from crosscheck.library.accepted import Figure, dumps
 from crosscheck.records.kinds import CaseRecord, VariantInfo
+from flexmb.run.rounding import Sizes
 from tests.crosscheck.made_records import ONE_PAIR, PAIR, TIMES, TIP, ended, judged, ladder, run_file, single, way
 
 FORCE = "load:pivot.force"

@@ -12,10 +12,10 @@ from scipy.spatial.transform import Rotation
 from scipy.special import ellipj, ellipk
 
 from crosscheck.judging.results import collect
-from crosscheck.judging.sizes import Sizes
-from crosscheck.judging.uncertainty import RungSignal, estimate, observed_order, roundoff_floor, spatial, unknown
+from crosscheck.judging.uncertainty import RungSignal, estimate, observed_order, spatial, unknown
 from crosscheck.judging.verdict import Signal, compare, conserve
 from crosscheck.records.kinds import CaseRecord
+from flexmb.run.rounding import Sizes, roundoff_floor
 from flexmb.typing import Real
 from tests.crosscheck.made_records import ONE_PAIR, ladder, run_file
 

@@ -11,9 +11,10 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from crosscheck.judging.uncertainty import RungSignal, Uncertainty, estimate, observed_order, roundoff_floor, spatial
+from crosscheck.judging.uncertainty import RungSignal, Uncertainty, estimate, observed_order, spatial
 from crosscheck.judging.verdict import STATUSES, Finding, Signal, Verdict, compare, conserve
 from flexmb.run.channels import distance, magnitude, signal_range
+from flexmb.run.rounding import roundoff_floor
 
 TIMES = np.linspace(0.0, 1.0, 11)
 CHANNEL = "load:pivot.force"

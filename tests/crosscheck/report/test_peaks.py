@@ -19,7 +19,6 @@ from crosscheck.records.kinds import ENVELOPE, RunRecord
 from crosscheck.records.packing import pack
 from crosscheck.records.session import last_session
 from crosscheck.report import write_all
-from crosscheck.report.charts import ROUNDING
 from crosscheck.sealed.seal import read_results
 from tests.crosscheck.report.reading import data_of
 from tests.crosscheck.sessions import copy_case, sweep_here, versus
@@ -115,7 +114,8 @@ def test_rounding_is_not_drawn_as_a_signal(folder: Path) -> None:
     file = folder / "records.jsonl"
     session(folder, envelopes=False)
     text = file.read_text(encoding="utf-8")
-    noise = pack(1e-14 * np.random.default_rng(1).normal(size=(21, 3)))
+    noise_of_torque = 1e-15 * np.random.default_rng(1).normal(size=(21, 3))
+    noise = pack(noise_of_torque)
     lines = []
     for line in text.splitlines():
         record = json.loads(line)
@@ -130,5 +130,5 @@ def test_rounding_is_not_drawn_as_a_signal(folder: Path) -> None:
     by_name = {channel["name"]: channel for channel in loads["channels"]}
     assert by_name["load:pivot.force"]["range"] is None and by_name["load:pivot.force"]["events"] == [0.7]
     low, high = by_name["load:pivot.torque"]["range"]
-    assert high == -low > 100.0 * 1e-14 and high <= ROUNDING * 100.0
+    assert high == -low > 100.0 * np.abs(noise_of_torque).max() and high < 1e-9 * 20.0
     assert [peak.t for peak in peaks(collect(read(file)).cases[0]) if peak.channel == "load:pivot.torque"]

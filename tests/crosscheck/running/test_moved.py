@@ -14,7 +14,6 @@ from crosscheck.engines.contract import Effort, Run
 from crosscheck.engines.native import NativeEngine
 from crosscheck.judging.outcome import conclude
 from crosscheck.judging.results import collect
-from crosscheck.judging.uncertainty import ulp_of_arithmetic
 from crosscheck.judging.verdict import Finding, Signal, compare
 from crosscheck.library.find import load_case
 from crosscheck.records.archive import read
@@ -23,6 +22,7 @@ from crosscheck.running import moved
 from crosscheck.running.job import Job
 from crosscheck.running.moved import ULP, moved_scene
 from crosscheck.running.rung import determined
+from flexmb.run.rounding import ulp_of_arithmetic
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
 from tests.crosscheck.sessions import copy_case, sweep_here, versus

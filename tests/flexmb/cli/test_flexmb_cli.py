@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 import flexmb as fm
-from flexmb.cli import app
+from flexmb.cli import app, running
 from flexmb.run.warm_up import pendulum
 from flexmb.scene.shapes import beam_section
 
@@ -32,22 +32,47 @@ def test_simulate_writes_a_csv_and_charts_and_tells_what_happened(scene_file, tm
         assert word in result.output
 
 
-def test_loads_are_said_to_be_those_of_output_times_and_peaks_are_found_where_asked_for(scene_file, tmp_path):
+def test_a_run_ends_with_where_the_peaks_are_and_when(scene_file, tmp_path):
     words = ("simulate", scene_file, "--t-end", 3, "--samples", 3, "--out", tmp_path, "--no-plots")
+    run = fm.simulate(pendulum(), 3.0, samples=3)
+    force = run.envelope.loads["pivot"]
+    axis = 3 + int(np.argmax(force.largest[3:]))
+    peak = force.greatest[axis] if force.greatest[axis] == force.largest[axis] else force.least[axis]
+    assert abs(peak) > 1.002 * np.abs(run.loads["pivot"][:, axis]).max()  # at the output times it is missed
     result = invoke(*words)
-    said = " ".join(result.output.split())
-    assert "largest loads" in said and "at the 3 output times; --envelope (Trajectory.envelope) finds the peaks" in said
+    table = result.output[result.output.index("Peaks of loads over all steps") :].splitlines()
+    (row,) = [line for line in table if line.startswith(f"pivot.force.{'xyz'[axis - 3]}")]
+    assert f"{peak:.6g} N" in row and max(map(len, table)) <= 80
+    assert "zero but for rounding: pivot.torque" in result.output
     assert not (tmp_path / "envelope.csv").exists()
     result = invoke(*words, "--envelope")
     assert result.exit_code == 0, result.output
-    run = fm.simulate(pendulum(), 3.0, samples=3)
-    peak = run.envelope.magnitudes["load:pivot.force"].greatest[0]
-    assert peak > 1.002 * np.linalg.norm(run.loads["pivot"][:, 3:], axis=1).max()
-    assert "Peaks over all steps" in result.output and f"{peak:.6g} N" in result.output
     rows = dict(line.split(",", 1) for line in (tmp_path / "envelope.csv").read_text().splitlines())
-    assert float(rows["load:pivot.force"].split(",")[3]) == peak
-    invoke(*words)  # an earlier run's does not stay beside another trajectory
+    assert float(rows[row.split()[0]].split(",")[3]) == force.greatest[axis]
+    result = invoke(*words, "--no-envelope")  # an earlier run's does not stay beside another trajectory
     assert not (tmp_path / "envelope.csv").exists()
+    sampled = run.loads["pivot"][:, axis]
+    assert "over the 3 output times\n" in result.output
+    assert f"{sampled[np.argmax(np.abs(sampled))]:.6g} N" in result.output and f"{peak:.6g} N" not in result.output
+
+
+def test_long_runs_are_not_followed_unasked_and_a_quiet_one_tells_its_files(scene_file, tmp_path, monkeypatch):
+    words = ("simulate", scene_file, "--t-end", 0.5, "--samples", 3, "--out", tmp_path, "--no-plots")
+    monkeypatch.setattr(running, "SHORT", 10)
+    assert "over the 3 output times; --envelope finds those between" in invoke(*words).output
+    lines = invoke(*words, "--quiet").output.splitlines()
+    assert [line.split()[0] for line in lines] == ["wrote"] and "trajectory.csv" in lines[0]
+
+
+def test_peaks_that_cannot_be_followed_are_those_of_the_output_times(scene_file, tmp_path, monkeypatch):
+    def fails(self):
+        raise fm.DynamicsError("the motion cannot be followed")
+
+    monkeypatch.setattr(fm.Trajectory, "envelope", property(fails))
+    words = ("simulate", scene_file, "--t-end", 0.5, "--samples", 3, "--out", tmp_path, "--no-plots")
+    result = invoke(*words)
+    assert result.exit_code == 0 and "over the 3 output times: the motion cannot be followed" in result.output
+    assert invoke(*words, "--envelope").exit_code == 1
 
 
 def test_a_run_that_stops_early_writes_what_it_reached_and_exits_1(tmp_path):

@@ -5,15 +5,13 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 from msgspec import structs
 
 import flexmb as fm
 from flexmb.integrate.catalogue import INTEGRATORS
-from flexmb.run import plots, trajectory
+from flexmb.run import trajectory
 from flexmb.run.times import sample_bytes, sample_times, timing
 from flexmb.tables.status import Status
-from tests.benchmarks.rivals import rigid_chain
 from tests.trees import random_scene
 
 EPS = np.finfo(float).eps
@@ -206,17 +204,6 @@ def test_the_memory_of_outputs_is_what_is_reckoned_with():
         tracemalloc.stop()
     assert run.finished
     assert 0.25 < (taken[1] - taken[0]) / (200 * sample_bytes(system)) <= 1.0
-
-
-def test_of_many_curves_a_chart_has_the_largest_and_says_so():
-    """A thousand of them, with their names, would take eight seconds to draw, and could not be read."""
-    run = fm.simulate(rigid_chain(12), 0.01, samples=3)
-    figure = Figure()
-    plots._loads(run, figure)
-    _, force = figure.axes
-    largest = sorted(run.loads, key=lambda name: -np.max(np.linalg.norm(run.loads[name][:, 3:], axis=1)))[:10]
-    assert sorted(line.get_label() for line in force.lines) == sorted(largest)
-    assert force.get_title() == "the 10 largest of 12"
 
 
 def test_plots_are_written(tmp_path):

@@ -1,9 +1,6 @@
 """A view shows where things are: its page is unpacked as the browser unpacks it, and compared with the run."""
 
-import base64
-import json
 import re
-import zlib
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +12,7 @@ from flexmb.cli import app
 from flexmb.linear.mode_view import AMPLITUDE, mode_view
 from flexmb.scene.shapes import beam_section
 from flexmb.typing import Real
+from tests.flexmb.view.pages import unpacked
 
 WIDE = {"COLUMNS": "200"}
 SECTION = beam_section(E=7e10, G=2.7e10, A=2e-4, Iy=1.7e-9, Iz=1.7e-9, rho=2700.0)
@@ -30,13 +28,7 @@ def boom() -> fm.Scene:
 
 def read(html: str) -> tuple[dict, list[Real]]:
     """The animation of a page, and its series (T,k)."""
-    data = json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', html, re.DOTALL)[1])
-    planes = np.frombuffer(zlib.decompress(base64.b64decode(data["series"]["data"])), np.uint8).reshape(4, -1)
-    differences, at, series = np.ascontiguousarray(planes.T).view("<u4").ravel(), 0, []
-    for rows, columns in data["series"]["shapes"]:
-        bits = differences[at : at + rows * columns].reshape(columns, rows).cumsum(axis=1, dtype=np.uint32)
-        series.append(bits.view("<f4").T.astype(float))
-        at += rows * columns
+    data, series = unpacked(html)
     (animation,) = data["animations"]
     return animation, series
 
