@@ -19,6 +19,10 @@ if TYPE_CHECKING:
 
 def view(
     scene: SceneFile,
+    run: Annotated[
+        Path | None,
+        typer.Argument(help="A stored run: its folder, CSV or .npz.", metavar="[RUN]", show_default=False),
+    ] = None,
     t_end: Annotated[float | None, typer.Option("--t-end", help="Run to this time in s.", show_default=False)] = None,
     mode: Annotated[
         int | None,
@@ -35,8 +39,10 @@ def view(
         flexmb view boom.toml
         flexmb view boom.toml --t-end 60 --out boom.html
         flexmb view boom.toml --mode 3
+        flexmb simulate boom.toml --t-end 60 --out out && flexmb view boom.toml out
 
-    A run is one by default settings. A mode is that about the equilibrium, with an amplitude for display.
+    `--t-end` makes a run by default settings; RUN is one that `flexmb simulate` has written. A mode is that about the
+    equilibrium, with an amplitude for display.
 
     **Exit code**: 0 written, 1 the run stopped before its end (what was reached is written) or no equilibrium was
     found, 2 the scene or an option is wrong.
@@ -45,16 +51,20 @@ def view(
         from flexmb.scene.files import load_scene
         from flexmb.view.page import html_file
 
-        if t_end is not None and mode is not None:
-            raise ValueError("--t-end and --mode exclude each other: a page shows a run or a mode")
+        if sum(asked is not None for asked in (run, t_end, mode)) > 1:
+            raise ValueError("RUN, --t-end and --mode exclude each other: a page shows a run or a mode")
         check_folder(html_file(out).parent)
         loaded, message = load_scene(scene), ""
         with console.status(Text(f"drawing {scene} (the first time after an update compiles)")):
-            if t_end is not None:
+            if run is not None:
+                from flexmb.run.stored import stored_view
+
+                shown = stored_view(loaded, run)
+            elif t_end is not None:
                 from flexmb.run.simulate import simulate
 
-                run = simulate(loaded, t_end)
-                shown, message = run.view(), "" if run.finished else run.message
+                made = simulate(loaded, t_end)
+                shown, message = made.view(), "" if made.finished else made.message
             else:
                 shown = _start(loaded) if mode is None else _mode(loaded, mode)
             shown.save(out)
@@ -68,11 +78,12 @@ def view(
 def _start(scene: Scene) -> View:
     """The scene at its initial state."""
     from flexmb.system.compile import compile as compiled
-    from flexmb.view.scene_view import scene_view
+    from flexmb.view.scene_view import applied_at, scene_view
 
     system = compiled(scene)
     state, (names, _) = system.initial_state, system.state_names
-    return scene_view([system.scene], [state], [name for name, _ in names], "initial state")
+    applied = applied_at([system], [state])
+    return scene_view([system.scene], [state], [name for name, _ in names], "initial state", applied=applied)
 
 
 def _mode(scene: Scene, number: int) -> View:

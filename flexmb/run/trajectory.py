@@ -234,17 +234,20 @@ class Trajectory(RunArrays):
         """The motion in three dimensions as one HTML page that needs no network; written to `path` if that is given.
 
         A notebook shows the view that it returns. Up to 201 output times are frames: bodies with beams as they bend,
-        wheels, point masses, connectors, hinges, trails of markers, and arrows of the loads at hinges and closures.
+        wheels, point masses, connectors, hinges, trails of markers, and arrows of the loads at hinges and closures,
+        and of those from outside. The page names loads that the motion does not determine.
         ValueError for a trajectory that `simulate` has not made, and for a path that does not end in .html.
         """
         from flexmb.view.page import html_file
-        from flexmb.view.scene_view import scene_view  # here, because most runs are not drawn
+        from flexmb.view.scene_view import applied_at, scene_view  # here, because most runs are not drawn
 
         made_by = self._making("a view")
         file = None if path is None else html_file(path)
         scenes = [system_at(made_by, t).scene for t in self.t.tolist()]
         states = list(map(State, self.q, self.u, self.t.tolist()))
-        view = scene_view(scenes, states, [name for name, _ in self.q_names], self.message, self.loads)
+        applied = applied_at(systems_at(self, made_by), states) if made_by.system.scene.loads else {}
+        names = [name for name, _ in self.q_names]
+        view = scene_view(scenes, states, names, self.message, self.loads, applied=applied)
         if file is not None:
             view.save(file)
         return view

@@ -23,12 +23,13 @@ from flexmb.scene.bodies import BeamBody
 from flexmb.scene.problems import SceneWarning
 from flexmb.scene.sections import ABOUT_Y, ABOUT_Z, EXTENSION, TWIST
 from flexmb.scene.tree import place_along
+from flexmb.system.applied import applied_to
 from flexmb.system.frames import MotionTables, Pose, body_pose, closure_frames_of, hinge_frames_of, link_pose
 from flexmb.system.moved_sections import cross, moved_sections, rotation_along, turning
 from flexmb.system.observables import Evaluation
 from flexmb.system.scene_arrays import SceneArrays
 from flexmb.tables import arguments
-from flexmb.tables.arrays import NODE_AXES, TORQUE, Workspace
+from flexmb.tables.arrays import Workspace
 from flexmb.tables.state import finite_result
 from flexmb.typing import Real
 
@@ -232,8 +233,7 @@ class SectionBalance:
 
     def _outer(self, w: MotionTables, pose: Pose, exerted: Evaluation) -> list[_Outer]:
         """All loads on the beam, with their places along it."""
-        arrays, k, scene = self._arrays, self._k, self._arrays.scene
-        constants = arrays.constants
+        arrays, k = self._arrays, self._k
         outer: list[_Outer] = []
 
         def add(node: str, torque: Real, force: Real, point: Real, *, at: bool = True) -> None:
@@ -242,19 +242,11 @@ class SectionBalance:
             about = torque + cross(point - pose.position, force)
             outer.append(_Outer(beyond, np.concatenate([pose.rotation.T @ about, pose.rotation.T @ force])))
 
-        carrier = link_pose(w, k)
         for n, joined in enumerate(joined_loads(arrays, w, k, exerted)):
             # a section at the beam's own hinge itself, the first of them, transmits its load: the hinge is not beyond
             add(*joined, at=n > 0)
-        rows = range(int(constants.body[k]["load_start"]), int(constants.body[k]["load_stop"]))
-        for load_of, row in zip((load for load in scene.loads if load.body == self.body), rows, strict=True):
-            table = constants.load[row]
-            port, value = table["port"], w.function[table["function"], 0] * table["direction"]
-            if table["frame"] == NODE_AXES:
-                value = carrier.rotation @ w.port["R"][port].reshape(3, 3) @ value
-            point, none = carrier.position + carrier.rotation @ w.port["r"][port], np.zeros(3)
-            torque, force = (value, none) if table["type"] == TORQUE else (none, value)
-            add(load_of.node, torque, force, point)
+        for applied in applied_to(arrays, w, k):
+            add(applied.load.node, applied.torque, applied.force, applied.point)
         return outer
 
 

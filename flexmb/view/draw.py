@@ -1,28 +1,33 @@
 """The drawing of a scene: every drawn point is a marker plus a fixed offset in the marker's axes.
 
-A rigid body is drawn as the box of the same mass and inertia, or as a ball if it has no inertia; a flexible body as a
-line through its nodes with markers; wheels as discs, fixed point masses as balls, springs as coils, bushings and
-springs of hinges as marks. Only markers are recorded, so that drawing needs no mechanics; bodies without a marker are
-not drawn. `film.py` adds the markers that each body needs."""
+A rigid body is drawn as the box of the same mass and inertia, or as a ball if it has no inertia; a beam as a bent bar
+with the widths of its sections; another flexible body as a surface between its nodes with markers, or a line through
+them; wheels as discs, fixed point masses as balls, springs as coils, bushings and springs of hinges as marks. Only
+markers are recorded, so that drawing needs no mechanics; bodies without a marker are not drawn. `film.py` adds the
+markers that each body needs."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import assert_never
 
+import msgspec
 import numpy as np
+from scipy.spatial import ConvexHull, Delaunay
 from scipy.spatial.transform import Rotation
 
-from flexmb.scene.bodies import ZERO, BeamBody, Body, ModalBody, RigidBody, SidBody, Vector
+from flexmb.scene.bodies import ZERO, BeamBody, BeamStation, Body, ModalBody, RigidBody, SidBody, Vector
 from flexmb.scene.check.profiles import start_of
 from flexmb.scene.connectors import BetweenNodes, HingeSpring
 from flexmb.scene.rest_curve import rest_sections
 from flexmb.scene.schema import Marker, Scene, Wheel
+from flexmb.scene.sections import ABOUT_Y, ABOUT_Z, EXTENSION
 from flexmb.scene.tree import GROUND, ends, node_frame, nodes_along
 from flexmb.typing import Real
 from flexmb.view.drawing import CarriedPoint, Drawing, DrawnWheel, Line
 
 LARGEST_ASPECT = 12.0
+FLAT = 1e-3  # extent of points in a direction, over their largest, below which they span none
 THINNEST_WHEEL = 0.1  # least drawn width of a wheel over its radius
 
 
@@ -112,21 +117,62 @@ def carried(scene: Scene, body: str, node: str, offset: Vector) -> CarriedPoint 
 
 
 def _beam(scene: Scene, body: BeamBody, markers: list[Marker]) -> Line:
-    """A line through the beam's nodes with markers in their order along it, with the tangents of its axis."""
+    """A line through the beam's nodes with markers in their order along it, with the tangents of its axis and the
+    rectangles of its sections."""
     nodes, along = _by_node(markers), nodes_along(body)
     placed = sorted(nodes.values(), key=lambda marker: along[marker.node])
-    tangents = rest_sections(body, np.array([along[marker.node] for marker in placed]))[1][:, :, 0]
-    return _bent(scene, body, placed, tangents)
+    x = np.array([along[marker.node] for marker in placed])
+    turns = rest_sections(body, x)[1]
+    line = _bent(scene, body, placed, turns[:, :, 0])
+    across = [_turned_back(body, marker, y) for marker, y in zip(placed, turns[:, :, 1], strict=True)]
+    widths = [(float(y), float(z)) for y, z in _widths(body, x)]
+    missing = len(line.points) - len(across)  # the inboard hinge, which has no marker of the beam
+    return msgspec.structs.replace(
+        line, across=(*across[:1] * missing, *across), widths=(*widths[:1] * missing, *widths)
+    )
+
+
+def _widths(body: BeamBody, x: Real) -> Real:
+    """Widths (n,2) m along y and z of the homogeneous rectangles with the bending and axial stiffness of the sections:
+    EIz/EA = b_y^2/12, EIy/EA = b_z^2/12."""
+    stations = sorted(body.stations, key=lambda station: station.x_m)
+    places = [station.x_m for station in stations]
+    squares = np.array([12.0 * np.array(_bending_over_axial(station)) for station in stations])
+    return np.sqrt(np.stack([np.interp(x, places, column) for column in squares.T], axis=1))
+
+
+def _bending_over_axial(station: BeamStation) -> tuple[float, float]:
+    """EIz/EA and EIy/EA (m^2) of a station."""
+    if station.stiffness is None:
+        return station.EIz_Nm2 / station.EA_N, station.EIy_Nm2 / station.EA_N  # type: ignore[operator]
+    K = np.array(station.stiffness)
+    return K[ABOUT_Z, ABOUT_Z] / K[EXTENSION, EXTENSION], K[ABOUT_Y, ABOUT_Y] / K[EXTENSION, EXTENSION]
 
 
 def _flexible(scene: Scene, body: ModalBody | SidBody, markers: list[Marker]) -> Line:
-    """A line through the body's nodes with markers in the order of their distance from its origin."""
+    """The nodes of a body: a surface between them where they span one, else a line through them in the order of their
+    distance from its origin."""
     nodes = _by_node(markers)
     placed = sorted(nodes.values(), key=lambda marker: float(np.linalg.norm(_node_point(body, marker.node, ZERO))))
     rest = np.array([_node_point(body, marker.node, ZERO) for marker in placed])
+    faces = _faces(rest)
+    if faces:
+        points = tuple(CarriedPoint(marker.name, _vector(-np.array(marker.offset_m))) for marker in placed)
+        return Line(body=body.name, kind="sheet", points=points, faces=faces)
     from_root = _root_point(scene, body) is not None and float(np.linalg.norm(rest[0])) > 0.0
     along = np.vstack([np.zeros(3), rest]) if from_root else rest
     return _bent(scene, body, placed, _directions(along)[-len(placed) :])
+
+
+def _faces(points: Real) -> tuple[tuple[int, int, int], ...]:
+    """Triangles between points (n,3): of their plane, or of their hull where they are in none; none on a line."""
+    middle = points - points.mean(axis=0)
+    _, sizes, axes = np.linalg.svd(middle, full_matrices=False)
+    spanned = int(np.sum(sizes > FLAT * sizes[0])) if len(points) > 2 else 1
+    if spanned < 2:
+        return ()
+    found = Delaunay(middle @ axes[:2].T) if spanned == 2 else ConvexHull(points)
+    return tuple((int(a), int(b), int(c)) for a, b, c in found.simplices)
 
 
 def _by_node(markers: list[Marker]) -> dict[str, Marker]:
@@ -140,10 +186,15 @@ def _bent(scene: Scene, body: Body, placed: list[Marker], tangents: Real) -> Lin
     root = _root_point(scene, body)
     from_root = float(np.linalg.norm(_node_point(body, placed[0].node, ZERO))) > 0.0
     points = [
-        CarriedPoint(marker.name, _vector(-np.array(marker.offset_m)), _vector(_pose(body, marker)[1].inv().apply(way)))
+        CarriedPoint(marker.name, _vector(-np.array(marker.offset_m)), _turned_back(body, marker, way))
         for marker, way in zip(placed, tangents, strict=True)
     ]
     return Line(body=body.name, kind="beam", points=(*([root] if root and from_root else []), *points))
+
+
+def _turned_back(body: Body, marker: Marker, way: Real) -> Vector:
+    """A direction in the body frame at rest, in the axes of a marker."""
+    return _vector(_pose(body, marker)[1].inv().apply(way))
 
 
 def _directions(points: Real) -> Real:

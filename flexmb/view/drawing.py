@@ -24,12 +24,17 @@ class Line(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     "solid": the eight corners of a box, the first coordinate's sign changing slowest. "arm": a straight line. "beam": a
     line through its points that bends with their tangents. "ball": a point with mass. "spring": a coil between its two
     points. "mount": a mark at each of its points, the frames of a bushing or the hinge of a spring. Records of older
-    versions have "box", one edge of a box, and "wheel", a rim: straight lines both.
+    versions have "box", one edge of a box, and "wheel", a rim: straight lines both. "sheet": a surface of triangles
+    between its points, whose numbers `faces` has. `across`, `widths`: at each point of a beam the direction of the
+    section's y in its marker's axes, and the widths (m) of the section along y and z; none for a line without sections.
     """
 
     body: str
     kind: str
     points: tuple[CarriedPoint, ...]
+    across: tuple[Vector, ...] = ()
+    widths: tuple[tuple[float, float], ...] = ()
+    faces: tuple[tuple[int, int, int], ...] = ()
 
 
 class DrawnWheel(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -75,7 +80,9 @@ def carried_point(point: CarriedPoint, number: dict[str, int]) -> list[float]:
 
 def carried_line(line: Line, number: dict[str, int]) -> dict[str, Any]:
     """A line with its points."""
-    return {"body": line.body, "kind": line.kind, "points": [carried_point(point, number) for point in line.points]}
+    drawn = {"body": line.body, "kind": line.kind, "points": [carried_point(point, number) for point in line.points]}
+    more = {"across": line.across, "widths": line.widths, "faces": line.faces}
+    return drawn | {key: value for key, value in more.items() if value}
 
 
 def carried_wheel(wheel: DrawnWheel, number: dict[str, int], angle: int) -> dict[str, Any]:

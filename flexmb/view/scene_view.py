@@ -8,11 +8,15 @@ import msgspec
 import numpy as np
 
 from flexmb.interchange.sid.to_body import with_sid_bodies
+from flexmb.output.printable import printable
 from flexmb.scene.bodies import ZERO
 from flexmb.scene.quaternions import quaternion_of
 from flexmb.scene.schema import Scene
+from flexmb.system.applied import applied_loads
 from flexmb.system.compile import assembled
 from flexmb.system.frames import hinge_frames, node_pose
+from flexmb.system.observables import open_components, undetermined_loads
+from flexmb.system.system import System
 from flexmb.tables.state import State
 from flexmb.typing import Real
 from flexmb.view.draw import draw
@@ -54,12 +58,28 @@ class _Filmed:
         system.inverse_at(t, y, np.zeros(system.nu))  # for the poses in the workspace
         w = system.own_workspace
         found = {_joint(name): (at.point, at.outboard) for name, at in hinge_frames(system, w).items()}
+        for load in self.scene.loads:
+            found[_acting(load.name)] = (node_pose(system, w, load.body, load.node)[1], np.eye(3))
         for name in names:
             if name in self._places:
                 body, node, offset = self._places[name]
                 rotation, position = node_pose(system, w, body, node)
                 found[name] = (position + rotation @ offset, rotation)
         return found
+
+
+def applied_at(systems: Iterable[System], states: Sequence[State]) -> dict[str, Real]:
+    """The loads of a scene by name (T,6) [torque; force] about their nodes, World axes, at states (T); zero at those
+    that a view leaves out. systems: that of each state, each used until the next one is asked for."""
+    shown, found = set(sampled(len(states)).tolist()), {}
+    for i, (system, state) in enumerate(zip(systems, states, strict=True)):
+        if i not in shown or not system.scene.loads:
+            continue
+        t, y = system.layout.entering(state)
+        system.inverse_at(t, y, np.zeros(system.nu))  # for the poses and functions of time in the workspace
+        for name, load in applied_loads(system, system.own_workspace).items():
+            found.setdefault(name, np.zeros((len(states), 6)))[i] = load
+    return found
 
 
 def scene_view(
@@ -69,12 +89,15 @@ def scene_view(
     title: str,
     loads: Loads | None = None,
     times: Real | None = None,
+    applied: Loads | None = None,
+    notes: Sequence[str] = (),
 ) -> View:
     """The view of a scene at states, which are frames in the order of time.
 
     scenes: that of each state, which events may have altered, of the same bodies and hinges. names: of the coordinates
     (nq,) of states. loads: by hinge or closure (T,6) [torque; force] about the hinge point, World axes, for arrows.
-    times (T,) s: on the clock of the page, by default those of the states.
+    times (T,) s: on the clock of the page, by default those of the states. applied: by load of the scene (T,6) about
+    its node, World axes. notes: sentences for the page, which also names the loads that are not determined.
     ValueError without states or bodies; SidError or OSError if a body's file cannot be read.
     """
     if not states:
@@ -89,7 +112,10 @@ def scene_view(
     if not drawing.lines:
         raise ValueError("there is nothing to draw: the scene has no bodies")
     arrows = {name: values[chosen] for name, values in (loads or {}).items()}
-    carrying = list(dict.fromkeys((*carriers(drawing), *map(_joint, arrows))))
+    pushes = {name: values[chosen] for name, values in (applied or {}).items()}
+    carrying = list(dict.fromkeys((*carriers(drawing), *map(_joint, arrows), *map(_acting, pushes))))
+    unknown = open_components(undetermined_loads(loads or {}, {}))
+    notes = [*notes, *([f"No arrows where the motion does not determine a load: {unknown}."] if unknown else [])]
     frames = [films[id(scenes[i])].poses(carrying, states[i]) for i in chosen]
     store, number = Store(), {name: i for i, name in enumerate(carrying)}
     q = np.array([states[i].q for i in chosen])
@@ -111,9 +137,11 @@ def scene_view(
         ],
         "trails": [number[name] for name in drawing.trails],
         "gravity": drawing.gravity,
+        "notes": [printable(note) for note in notes],
         "arrows": [
-            {"name": name, "kind": kind, "marker": number[_joint(name)], "values": store.samples(_drawn(part))}
-            for name, load in arrows.items()
+            {"name": name, "kind": f"{prefix}{kind}", "marker": number[at(name)], "values": store.samples(_drawn(part))}
+            for prefix, group, at in (("", arrows, _joint), ("applied ", pushes, _acting))
+            for name, load in group.items()
             for kind, part in (("force", load[:, 3:]), ("torque", load[:, :3]))
         ],
     }
@@ -123,6 +151,11 @@ def scene_view(
 def _joint(name: str) -> str:
     """The carrier that moves with the outboard frame of a hinge, point mass or closure."""
     return f"joint:{name}"
+
+
+def _acting(name: str) -> str:
+    """The carrier that moves with the node on which a load acts."""
+    return f"load:{name}"
 
 
 def _with_joints(scene: Scene, drawing: Drawing) -> Drawing:

@@ -6,7 +6,8 @@ const VIEW_DEG = 32;
 const SIGNS = { play: "M3 1 L14 8 L3 15 Z", pause: "M2 1 H6 V15 H2 Z M10 1 H14 V15 H10 Z" };
 const BODIES = ["#1d69b1", "#d1495b", "#2a9d6f", "#c38600", "#7c52b6", "#0f8b8d", "#a74b40", "#556984", "#b917a1", "#497215"];
 const CONNECTORS = { spring: ["#2b2b2b", "#e0e0e0"], mount: ["#d97500", "#ffa940"], joint: ["#5a6572", "#c3ccd6"] }, NAMES_OF = { spring: "springs", mount: "bushings, springs in hinges", joint: "hinges, closures" };
-const ARROWS = { force: ["#b3261e", "#ff8a80"], torque: ["#6a1b9a", "#ce93d8"] }; // loads at hinges
+const ARROWS = { force: ["#b3261e", "#ff8a80"], torque: ["#6a1b9a", "#ce93d8"], "applied force": ["#00695c", "#80cbc4"], "applied torque": ["#8a5a00", "#ffcc80"] };
+const LOADS = { force: "forces at hinges", torque: "torques at hinges", "applied force": "forces from outside", "applied torque": "torques from outside", "": "no loads" };
 const TURNS = 7, PER_TURN = 8; // of the coil that a spring is drawn as
 const AXES = ["#d43c3c", "#3a8f3e", "#2f74c9"], TRAIL_TONE = "#d1495b";
 
@@ -27,9 +28,9 @@ class SceneView {
     host.innerHTML = '<canvas tabindex="0" role="img"></canvas><div class="controls"><button type="button" class="play" aria-label="play"><svg viewBox="0 0 16 16" aria-hidden="true"><path></path></svg></button>' +
       '<input type="range" min="0" max="1" step="0.001" value="0" aria-label="time"><span class="clock"></span></div>' +
       '<div class="controls"></div><ul class="bodies" aria-label="bodies"></ul>' +
-      '<p class="hint">Select the picture to turn it (drag, or shift and arrows) and to zoom (wheel, or + and -); space plays, arrows step.</p>';
+      '<p class="hint notes"></p><p class="hint">Select the picture to turn it (drag, or shift and arrows) and to zoom (wheel, or + and -); space plays, arrows step.</p>';
     const first = Math.max(0, animations.findIndex(a => a.lines.some(line => line.kind === "beam"))); // something that bends
-    this.canvas = host.querySelector("canvas"); this.title = title; this.names = host.querySelector(".bodies");
+    this.canvas = host.querySelector("canvas"); this.title = title; this.names = host.querySelector(".bodies"); this.notes = host.querySelector(".notes");
     this.slider = host.querySelector("input"); this.clock = host.querySelector(".clock"); this.button = host.querySelector("button");
     this.button.onclick = () => this.toggle();
     this.slider.oninput = () => { this.phase = Number(this.slider.value); this.draw(); };
@@ -48,9 +49,17 @@ class SceneView {
     if (animations.some(a => a.arrows?.length)) {
       const chooser = document.createElement("select");
       chooser.setAttribute("aria-label", "loads shown"); chooser.className = "loads";
-      for (const [kind, text] of [["force", "forces at hinges"], ["torque", "torques at hinges"], ["", "no loads"]]) chooser.add(new Option(text, kind));
+      const moving = arrow => series[arrow.values].some(c => c.some(v => v !== 0));
+      const kinds = new Set(animations.flatMap(a => a.arrows || []).filter(arrow => !arrow.kind.startsWith("applied") || moving(arrow)).map(arrow => arrow.kind));
+      for (const [kind, text] of Object.entries(LOADS)) if (!kind || kinds.has(kind)) chooser.add(new Option(text, kind));
+      this.arrowKind = chooser.value;
       chooser.onchange = () => { this.arrowKind = chooser.value; this.draw(); };
       host.querySelectorAll(".controls")[1].append(chooser);
+    }
+    if (this.canvas.captureStream && globalThis.MediaRecorder) {
+      const film = document.createElement("button");
+      film.type = "button"; film.className = "film"; film.textContent = "save as video"; film.onclick = () => this.film(film);
+      host.querySelectorAll(".controls")[1].append(film);
     }
     this.sign(); this.load(first);
     new ResizeObserver(() => { this.fitCanvas(); if (!this.turned) this.stand(); this.draw(); }).observe(this.canvas);
@@ -66,6 +75,22 @@ class SceneView {
     if (on === this.playing) return;
     this.playing = on; this.last = null; this.sign();
     if (on) requestAnimationFrame(t => this.tick(t));
+  }
+
+  // One pass of the motion as a video (WebM), recorded from the canvas by the browser in real time, and downloaded.
+  async film(button) {
+    const recorder = new MediaRecorder(this.canvas.captureStream(30)), pieces = [], wanted = this.wanted;
+    recorder.ondataavailable = event => pieces.push(event.data);
+    const ended = new Promise(done => { recorder.onstop = done; });
+    button.disabled = true; button.textContent = "recording";
+    this.phase = 0; this.play(true); recorder.start();
+    await new Promise(done => setTimeout(done, 1000 * this.loop));
+    recorder.stop(); await ended;
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(new Blob(pieces, { type: recorder.mimeType })); link.download = this.title.replace(/[^\w.-]+/g, "_") + ".webm";
+    link.click(); setTimeout(() => URL.revokeObjectURL(link.href), 60000);
+    this.recorded = pieces.reduce((sum, piece) => sum + piece.size, 0);
+    button.disabled = false; button.textContent = "save as video"; this.play(wanted);
   }
 
   // The button shows the action that it performs.
@@ -110,6 +135,7 @@ class SceneView {
     this.times = this.series[a.times][0]; this.frames = this.times.length;
     this.paths = a.markers.map(m => [this.series[m.position], this.series[m.orientation]]);
     this.loop = Math.min(LONGEST_LOOP_S, Math.max(SHORTEST_LOOP_S, this.times[this.frames - 1]));
+    this.notes.textContent = (a.notes || []).join(" "); this.notes.hidden = !this.notes.textContent;
     this.canvas.setAttribute("aria-label", `Animation of ${this.title}: ${a.title}, ${this.frames} frames to ${this.times[this.frames - 1].toPrecision(3)} s`);
     this.measure();
     this.build();
@@ -126,10 +152,10 @@ class SceneView {
     return [p.map(c => c[f] + r * (c[g] - c[f])), turned.map(v => v / size)];
   }
 
-  // A carried point and its tangent in World axes.
-  place([m, x, y, z, tx = 0, ty = 0, tz = 0], s) {
+  // A carried point, its tangent, and the direction of a section's y, in World axes.
+  place([m, x, y, z, tx = 0, ty = 0, tz = 0], s, across) {
     const [p, q] = this.pose(m, s), at = rotated(q, x, y, z);
-    return [at.map((v, k) => v + p[k]), rotated(q, tx, ty, tz)];
+    return [at.map((v, k) => v + p[k]), rotated(q, tx, ty, tz), across && rotated(q, ...across)];
   }
 
   // All drawn points of the scene at a frame.
@@ -211,6 +237,7 @@ class SceneView {
       const material = new THREE.MeshLambertMaterial({ color: colour.get(line.body) || connectorTone(line.kind), side: THREE.DoubleSide });
       if (line.kind === "solid") this.carrier(line.points[0][0]).add(...solid(line.points.map(p => p.slice(1, 4)), material));
       else if (["ball", "mount", "joint"].includes(line.kind)) for (const point of line.points) this.carrier(point[0]).add(dot(line.kind, point, (line.kind === "joint" ? 2.4 : 4.5) * thin, material));
+      else if (line.kind === "sheet") this.tubes.push(new Sheet(this.world, line, material));
       else this.tubes.push(new Tube(this.world, line, { beam: 1.8, spring: 0.45 }[line.kind] * thin || thin, material));
     }
     for (const wheel of this.shown.wheels) {
@@ -218,7 +245,7 @@ class SceneView {
       this.spinning.push([disc, wheel, this.series[wheel.angle][0]]);
     }
     // The longest arrow of a kind is a third of what the view reaches.
-    const largest = { force: 0, torque: 0 };
+    const largest = Object.fromEntries(Object.keys(ARROWS).map(kind => [kind, 0]));
     this.arrows = (this.shown.arrows || []).map(({ kind, marker, values }) => ({ kind, marker, values: this.series[values] }));
     for (const { kind, values: [x, y, z] } of this.arrows) x.forEach((v, f) => { largest[kind] = Math.max(largest[kind], Math.hypot(v, y[f], z[f])); });
     for (const arrow of this.arrows) {
@@ -258,7 +285,7 @@ class SceneView {
       const [p, [w, x, y, z]] = this.pose(m, s);
       group.position.set(...p); group.quaternion.set(x, y, z, w);
     }
-    for (const tube of this.tubes) tube.bend(tube.line.points.map(point => this.place(point, s)));
+    for (const tube of this.tubes) tube.bend(tube.line.points.map((point, i) => this.place(point, s, tube.line.across?.[i])));
     const g = Math.min(whole + 1, this.frames - 1);
     for (const { kind, marker, values, scale, mesh } of this.arrows) {
       const v = new THREE.Vector3(...values.map(c => scale * (c[whole] + (s - whole) * (c[g] - c[whole])))), length = v.length();
@@ -347,10 +374,32 @@ function wheelMesh(wheel, thin) {
   return outer;
 }
 
-// A tube through points with tangents (cubic Hermite; unknown tangents are estimated as straight as possible).
+// A surface of triangles between points, with their edges, seen from both sides.
+class Sheet {
+  constructor(world, line, material) {
+    this.line = line;
+    this.geometry = lineGeometry(line.points.map(() => [0, 0, 0]));
+    this.geometry.setIndex(line.faces.flat());
+    const edges = new THREE.BufferGeometry(), sides = line.faces.flatMap(([i, j, k]) => [[i, j], [j, k], [k, i]]);
+    edges.setAttribute("position", this.geometry.attributes.position); edges.setIndex(sides.flat());
+    for (const drawn of [new THREE.Mesh(this.geometry, material), new THREE.LineSegments(edges, new THREE.LineBasicMaterial({ color: tone("soft") }))]) {
+      drawn.frustumCulled = false; world.add(drawn);
+    }
+  }
+
+  bend(placed) {
+    const { position } = this.geometry.attributes;
+    placed.forEach(([p], i) => position.setXYZ(i, ...p));
+    position.needsUpdate = true; this.geometry.computeVertexNormals();
+  }
+}
+
+// A tube through points with tangents (cubic Hermite; unknown tangents are estimated as straight as possible), round or
+// with the rectangles of a beam's sections.
 class Tube {
   constructor(world, line, radius, material) {
     this.line = line; this.radius = radius;
+    if (line.widths) this.halves = finer(line.widths.map(pair => pair.map(v => Math.max(v / 2, 0.4 * radius))));
     this.spine = { beam: hermite, spring: placed => coil(placed, 7 * radius) }[line.kind] || (placed => placed.map(([p]) => p));
     this.rings = { beam: (line.points.length - 1) * FINER + 1, spring: TURNS * PER_TURN + 3 }[line.kind] || line.points.length;
     this.geometry = new THREE.BufferGeometry();
@@ -369,14 +418,20 @@ class Tube {
   bend(placed) {
     const spine = this.spine(placed), { position, normal } = this.geometry.attributes;
     const side = new THREE.Vector3(0, 0, 0), way = new THREE.Vector3(), other = new THREE.Vector3();
+    const sides = this.halves && finer(placed.map(([, , across]) => across));
     spine.forEach((p, i) => {
       const from = spine[Math.max(0, i - 1)], to = spine[Math.min(spine.length - 1, i + 1)];
       way.set(...to.map((v, k) => v - from[k])).normalize();
-      if (i === 0) side.set(Math.abs(way.x) < 0.8 ? 1 : 0, Math.abs(way.x) < 0.8 ? 0 : 1, 0);
+      if (sides) side.set(...sides[i]);
+      else if (i === 0) side.set(Math.abs(way.x) < 0.8 ? 1 : 0, Math.abs(way.x) < 0.8 ? 0 : 1, 0);
       side.addScaledVector(way, -side.dot(way)).normalize(); // the last ring's side, carried along
       other.crossVectors(way, side);
       for (let j = 0; j < RING; j++) {
-        const c = Math.cos(2 * Math.PI * j / RING), d = Math.sin(2 * Math.PI * j / RING);
+        let c = Math.cos(2 * Math.PI * j / RING), d = Math.sin(2 * Math.PI * j / RING);
+        if (sides) { // on the rectangle, in units of the radius
+          const most = Math.max(Math.abs(c), Math.abs(d)) * this.radius;
+          c *= this.halves[i][0] / most; d *= this.halves[i][1] / most;
+        }
         const n = [c * side.x + d * other.x, c * side.y + d * other.y, c * side.z + d * other.z];
         position.setXYZ(i * RING + j, ...p.map((v, k) => v + this.radius * n[k])); normal.setXYZ(i * RING + j, ...n);
       }
@@ -396,6 +451,13 @@ function coil([[p], [q]], width) {
     spine.push([..."xyz"].map((k, n) => p[n] + along * way[k] + c * side[k] + d * other[k]));
   }
   return [...spine, q];
+}
+
+// Values at points of a beam, and linearly between them.
+function finer(values) {
+  const found = [values[0]];
+  for (let i = 0; i + 1 < values.length; i++) for (let j = 1; j <= FINER; j++) found.push(values[i].map((v, k) => v + j / FINER * (values[i + 1][k] - v)));
+  return found;
 }
 
 function hermite(placed) {

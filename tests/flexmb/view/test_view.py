@@ -5,13 +5,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec import structs
 from typer.testing import CliRunner
 
 import flexmb as fm
+from crosscheck.library.find import shipped_folder
 from flexmb.cli import app
 from flexmb.linear.mode_view import AMPLITUDE, mode_view
+from flexmb.run.stored import stored_view
 from flexmb.scene.shapes import beam_section
 from flexmb.typing import Real
+from flexmb.view.draw import _faces
 from tests.flexmb.view.pages import unpacked
 
 WIDE = {"COLUMNS": "200"}
@@ -89,6 +93,128 @@ def test_arrows_are_the_loads_at_the_hinge_points(run: fm.Trajectory) -> None:
     np.testing.assert_allclose(series[at["position"]], 0.0, atol=1e-12)  # the hinge on the ground
 
 
+def pushed() -> fm.Scene:
+    """A boom that a force in World and a torque in the axes of its tip act upon."""
+    made = fm.SceneBuilder("pushed").beam("boom", length=2.0, modes=3, elements=8, section=SECTION)
+    made.revolute("shoulder", "ground", "boom", axis=(0, 0, 1), angle=0.3)
+    made.force(
+        "wind", "boom", node="tip", direction=(0, 1, 0), function=fm.Sine(amplitude=2.0, angular_frequency_rad_s=6.0)
+    )
+    made.torque("motor", "boom", node="tip", direction=(0, 1, 0), frame="node", function=fm.Constant(value=0.3))
+    return made.marker("end", "boom", node="tip").scene()
+
+
+def test_loads_from_outside_are_arrows_at_their_nodes() -> None:
+    run = fm.simulate(pushed(), 0.5, samples=26)
+    animation, series = read(run.view().html)
+    by_name = {(arrow["name"], arrow["kind"]): arrow for arrow in animation["arrows"]}
+    wind = by_name["wind", "applied force"]
+    expected = np.outer(2.0 * np.sin(6.0 * run.t), [0.0, 1.0, 0.0])
+    np.testing.assert_allclose(series[wind["values"]], expected, atol=1e-6)
+    at = animation["markers"][wind["marker"]]
+    np.testing.assert_allclose(series[at["position"]], run.markers["end"].position, atol=1e-6)
+    turned = series[by_name["motor", "applied torque"]["values"]]
+    w, x, y, z = run.markers["end"].quaternion.T
+    second = np.stack([2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)], axis=1)  # of the tip's axes
+    np.testing.assert_allclose(turned, 0.3 * second, atol=1e-6)
+    assert np.ptp(turned, axis=0).max() > 1e-3  # it turns with the tip
+
+
+def test_loads_that_a_controller_sets_are_drawn_as_they_were() -> None:
+    made = fm.SceneBuilder("held").rigid_body("arm", mass=1.0, com=(0.3, 0.0, 0.0), inertia=(0.1, 0.1, 0.1))
+    made.revolute("pivot", "ground", "arm", angle=0.4)
+    made.torque("motor", "arm", direction=(0, 0, 1), function=fm.ControlSignal(source="servo"))
+    made.sense_coordinate("angle", "pivot").pid("servo", "angle", kp=20.0, period=0.05)
+    run = fm.simulate(made.scene(), 0.3, samples=31)
+    animation, series = read(run.view().html)
+    (motor,) = [arrow for arrow in animation["arrows"] if (arrow["name"], arrow["kind"]) == ("motor", "applied torque")]
+    np.testing.assert_allclose(series[motor["values"]][:, 2], run.signals["servo"][:, 0], rtol=1e-6)
+    assert np.ptp(run.signals["servo"]) > 1.0
+
+
+def test_the_page_says_which_loads_are_not_determined(run: fm.Trajectory) -> None:
+    tree = fm.SceneBuilder("door", gravity=(0.0, 0.0, -9.81))
+    tree.rigid_body("door", mass=2.0, com=(0.5, 0.0, 0.0), inertia=(0.1, 0.2, 0.3), nodes={"top": (0.0, 0.0, 1.0)})
+    tree.revolute("lower", "ground", "door", angle=0.4, rate=1.5)
+    tree.closure("upper", "revolute", "door", "ground", node_a="top", position_b=(0.0, 0.0, 1.0))
+    animation, _ = read(fm.simulate(tree.scene(), 0.1, samples=3).view().html)
+    (note,) = animation["notes"]
+    assert note.startswith("No arrows where the motion does not determine a load: lower (torque x, y; force")
+    assert read(run.view().html)[0]["notes"] == []
+
+
+def test_a_beam_has_the_widths_of_its_sections() -> None:
+    """0.2 m along y and 0.05 m along z at the root, half of that at the tip."""
+    made = fm.SceneBuilder("plank")
+
+    stations = [
+        structs.replace(beam_section(E=7e10, G=2.7e10, A=y * z, Iy=y * z**3 / 12, Iz=z * y**3 / 12, rho=2700.0), x_m=x)
+        for x, y, z in ((0.0, 0.2, 0.05), (2.0, 0.1, 0.025))
+    ]
+    made.beam("plank", length=2.0, modes=2, elements=8, section=stations)
+    made.weld("root", "ground", "plank")
+    line = line_of(read(fm.simulate(made.scene(), 0.01, samples=2).view().html)[0], "plank", "beam")
+    assert len(line["widths"]) == len(line["across"]) == len(line["points"])
+    np.testing.assert_allclose(line["widths"][0], (0.2, 0.05), rtol=1e-12)
+    np.testing.assert_allclose(line["widths"][-1], (0.1, 0.025), rtol=1e-12)
+    np.testing.assert_allclose(line["across"], np.tile([0.0, 1.0, 0.0], (len(line["points"]), 1)), atol=1e-12)
+
+
+def test_nodes_that_span_a_surface_are_drawn_as_one() -> None:
+    """Nodes of a plate, of a box and of a line, of a body with modal data."""
+    plate = [(x, y, 0.0) for x in (0.0, 1.0, 2.0) for y in (0.0, 1.0)]
+    box = [(x, y, z) for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)]
+    line = [(x, 0.0, 0.0) for x in (0.0, 1.0, 2.0)]
+    assert [len(_faces(np.array(points))) for points in (plate, box, line, line[:2], line[:1])] == [4, 12, 0, 0, 0]
+    assert {i for face in _faces(np.array(plate)) for i in face} == set(range(6))
+
+
+@pytest.mark.parametrize("suffix", ["csv", "npz"])
+def test_a_stored_run_is_drawn_as_the_run_itself(tmp_path: Path, suffix: str) -> None:
+    scene = fm.load_scene(shipped_folder() / "spacecraft" / "deploy_and_slew" / "scene.toml")
+    run = fm.simulate(scene, 14.0, samples=29)  # one panel has latched
+    assert len(run.events) == 1
+    getattr(run, f"to_{suffix}")(tmp_path / f"trajectory.{suffix}")
+    for place in (tmp_path, tmp_path / f"trajectory.{suffix}"):
+        stored, there = read(stored_view(scene, place).html)
+        own, here = read(run.view().html)
+        for a, b in zip(own["markers"], stored["markers"], strict=True):
+            np.testing.assert_array_equal(here[a["position"]], there[b["position"]])
+            np.testing.assert_array_equal(here[a["orientation"]], there[b["orientation"]])
+        for a, b in zip(own["arrows"], stored["arrows"], strict=True):
+            assert (a["name"], a["kind"]) == (b["name"], b["kind"])
+            np.testing.assert_array_equal(here[a["values"]], there[b["values"]])
+        assert stored["title"] == "stored run to t = 14 s"
+
+
+def test_files_that_are_no_run_of_the_scene_are_refused(run: fm.Trajectory, tmp_path: Path) -> None:
+    run.to_csv(tmp_path / "trajectory.csv")
+    run.restart.save(tmp_path / "restart.npz")
+    (tmp_path / "torn.csv").write_text("t [s],a\n0,1\n1\n")
+    (tmp_path / "empty.csv").write_text("")
+    for place, said in (
+        ("restart.npz", "perhaps a restart"), ("torn.csv", "a number for every column"), ("empty.csv", "no column `t"),
+        ("view.html", "a stored run is a .csv or .npz"),
+    ):  # fmt: skip
+        with pytest.raises(ValueError, match=said):
+            stored_view(boom(), tmp_path / place)
+    with pytest.raises(ValueError, match="it is a run of another scene"):
+        stored_view(fm.load_scene(shipped_folder() / "pendulums" / "double" / "scene.toml"), tmp_path)
+    with pytest.raises(OSError):
+        stored_view(boom(), tmp_path / "none.csv")
+
+
+def test_a_stored_run_says_which_arrows_it_lacks(tmp_path: Path) -> None:
+    made = fm.SceneBuilder("held").rigid_body("arm", mass=1.0, com=(0.3, 0.0, 0.0), inertia=(0.1, 0.1, 0.1))
+    made.revolute("pivot", "ground", "arm", angle=0.4)
+    made.torque("motor", "arm", direction=(0, 0, 1), function=fm.ControlSignal(source="servo"))
+    made.sense_coordinate("angle", "pivot").pid("servo", "angle", kp=20.0, period=0.05)
+    fm.simulate(made.scene(), 0.3, samples=7).to_csv(tmp_path / "trajectory.csv")
+    animation, _ = read(stored_view(made.scene(), tmp_path).html)
+    assert animation["notes"] == ["No arrows of loads that a controller sets, as a stored run has none: motor."]
+    assert not [arrow for arrow in animation["arrows"] if arrow["name"] == "motor"]
+
+
 def test_a_moving_point_mass_and_a_wheel_are_drawn_where_they_are() -> None:
     made = fm.SceneBuilder("carrier").rigid_body("hub", mass=10, inertia=(1, 1, 1)).free("base", "ground", "hub")
     made.point_mass("slosh", "hub", mass=1.0, offset=(0.5, 0, 0), directions=((0, 1, 0),),
@@ -147,8 +273,15 @@ def test_the_command_writes_a_start_a_run_and_a_mode(tmp_path: Path) -> None:
         done = CliRunner().invoke(app, ["view", str(scene), *words, "--out", str(out)], env=WIDE)
         assert done.exit_code == 0, done.output
         assert read(out.read_text(encoding="utf-8"))[0]["lines"]
+    done = CliRunner().invoke(app, ["simulate", str(scene), "--t-end", "0.1", "--out", str(tmp_path / "run")], env=WIDE)
+    assert done.exit_code == 0, done.output
+    out = tmp_path / "stored.html"
+    done = CliRunner().invoke(app, ["view", str(scene), str(tmp_path / "run"), "--out", str(out)], env=WIDE)
+    assert done.exit_code == 0 and read(out.read_text(encoding="utf-8"))[0]["title"].startswith("stored run")
     for words, said in (
         (["--mode", "1", "--t-end", "1"], "exclude each other"),
+        ([str(tmp_path), "--t-end", "1"], "exclude each other"),
+        ([str(tmp_path / "none")], "a stored run is a .csv or .npz"),
         (["--out", str(tmp_path / "a.png")], "ends in .html"),
         (["--mode", "99"], "there is no mode 99"),
     ):
