@@ -7,6 +7,7 @@ import numpy as np
 from flexmb.linear.equations import built
 from flexmb.linear.equilibrium import equilibrium
 from flexmb.linear.linearize import linearize
+from flexmb.linear.spin import steady_spin
 from flexmb.scene.schema import Scene
 from flexmb.view.scene_view import View, scene_view
 
@@ -14,14 +15,20 @@ FRAMES = 49  # of a period
 AMPLITUDE = 0.15  # of the largest displacement (rad, m) of a mode
 
 
-def mode_view(scene: Scene, number: int) -> View:
+def mode_view(scene: Scene, number: int, spin: str | None = None, rate: float = 0.0) -> View:
     """Mode `number` (1 is the first of `LinearModel.modes`) about the equilibrium, drawn over one period.
 
-    Its largest displacement has the amplitude 0.15 (rad, m, or modal coordinate), without growth or decay. A rigid-body
-    motion is drawn over a second. ValueError if there is no such mode; ArithmeticError without an equilibrium.
+    spin: a hinge or wheel that turns at `rate` (rad/s); the mode is then one about the steady spin, which a Campbell
+    diagram has at that rate, seen in the rotating frame. The largest displacement has the amplitude 0.15 (rad, m, or
+    modal coordinate), without growth or decay. A rigid-body motion is drawn over a second. ValueError if there is no
+    such mode or spin; ArithmeticError without an equilibrium.
     """
     system = built(scene)
-    model = linearize(system, equilibrium(system), held=True)
+    if spin is None:
+        model, where = linearize(system, equilibrium(system), held=True), ""
+    else:
+        turning = steady_spin(system, spin, rate)
+        model, where = turning.linearize(), f", {spin} at {rate:g} rad/s, in the rotating frame"
     modes = model.modes
     if not 1 <= number <= len(modes):
         raise ValueError(f"there is no mode {number}: the scene has the modes 1 to {len(modes)}")
@@ -34,6 +41,6 @@ def mode_view(scene: Scene, number: int) -> View:
         [system.scene] * FRAMES,
         states,
         [name for name, _ in names],
-        f"mode {number}: {mode}",
+        f"mode {number}: {mode}{where}",
         times=period * phases / (2.0 * np.pi),
     )

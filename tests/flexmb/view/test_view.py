@@ -247,6 +247,19 @@ def test_a_mode_moves_with_its_amplitude_and_period() -> None:
         mode_view(scene, 99)
 
 
+def test_a_mode_of_a_spin_is_one_of_the_campbell_diagram() -> None:
+    """The frequency that the page plays is that of the diagram, which the spin has raised."""
+    made = fm.SceneBuilder("blade").beam("blade", length=2.0, modes=3, elements=8, section=SECTION, level="stiffened")
+    scene = made.revolute("shaft", "ground", "blade", axis=(0, 0, 1)).marker("end", "blade", node="tip").scene()
+    diagram = fm.campbell(scene, "shaft", [0.0, 20.0])
+    lowest = diagram.frequencies_hz[1].min()
+    assert lowest > 1.05 * diagram.frequencies_hz[0].min()
+    animation, series = read(mode_view(scene, 1, spin="shaft", rate=20.0).html)
+    times = series[animation["times"]][:, 0]
+    assert 1.0 / (times[-1] - times[0]) == pytest.approx(lowest, rel=1e-5)
+    assert animation["title"].endswith("shaft at 20 rad/s, in the rotating frame")
+
+
 def test_a_page_is_whole_and_says_names_as_text(run: fm.Trajectory, tmp_path: Path) -> None:
     view = run.view(tmp_path / "new" / "boom.html")
     text = (tmp_path / "new" / "boom.html").read_text(encoding="utf-8")
@@ -282,6 +295,8 @@ def test_the_command_writes_a_start_a_run_and_a_mode(tmp_path: Path) -> None:
         (["--mode", "1", "--t-end", "1"], "exclude each other"),
         ([str(tmp_path), "--t-end", "1"], "exclude each other"),
         ([str(tmp_path / "none")], "a stored run is a .csv or .npz"),
+        (["--spin", "shoulder", "--rate", "3"], "name one by --mode"),
+        (["--mode", "1", "--rate", "3"], "name its hinge or wheel by --spin"),
         (["--out", str(tmp_path / "a.png")], "ends in .html"),
         (["--mode", "99"], "there is no mode 99"),
     ):
