@@ -52,7 +52,9 @@ MOTIONS = (
         "satellite",
         "spacecraft/deploy_and_slew",
         "A satellite unfolds two flexible panels, which latch, and turns by its three wheels.",
-        100.0,
+        40.0,
+        62.0,
+        24.0,
     ),
     Motion(
         "bricard",

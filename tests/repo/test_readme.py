@@ -70,5 +70,21 @@ def test_the_python_examples_run() -> None:
     names: dict[str, Any] = {}
     for example in re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL):
         exec(compile(example, "README.md", "exec"), names)
-    assert names["trajectory"].t[-1] == 1.0
+    assert names["run"].t[-1] == 1.0
     assert names["loads"].shape == (6,)
+
+
+READ_A_MINUTE = 240  # words of prose, silently, by adults (Brysbaert 2019: 238)
+
+
+def minutes(page: str) -> float:
+    """Time to read the prose of a page: without blocks of code, and of links the words alone."""
+    prose = re.sub(r"```.*?```", "", page, flags=re.DOTALL)
+    words = re.sub(r"\]\([^)]*\)", "]", prose)
+    return len(re.findall(r"[A-Za-z][\w'.-]*", words)) / READ_A_MINUTE
+
+
+def test_it_is_read_in_two_minutes_and_its_tables_in_half_of_one() -> None:
+    table = "\n".join(line for line in README.splitlines() if line.startswith("|"))
+    assert minutes(README.replace(table, "")) <= 2.0 and minutes(table) <= 0.5
+    assert minutes(README + README) > 2.5  # a longer one is noticed
