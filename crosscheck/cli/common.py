@@ -110,7 +110,7 @@ EngineNames = Annotated[
     list[str] | None,
     typer.Option(
         "--engine", "-e", autocompletion=_complete_engine,
-        help="Only these engines (repeat it). One alone is compared with its partners.",
+        help="Only these engines (repeat it). One alone is compared with its partners. fmu:FILE is any FMU.",
     ),
 ]  # fmt: skip
 Json = Annotated[

@@ -1,4 +1,6 @@
-"""Which engines there are: the built-in adapters, and plug-ins from the entry-point group `crosscheck.engines`."""
+"""Which engines there are: the built-in adapters, plug-ins from the entry-point group `crosscheck.engines`, and any FMU
+by the name "fmu:FILE".
+"""
 
 from __future__ import annotations
 
@@ -8,6 +10,7 @@ from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from typing import TYPE_CHECKING
 
+from crosscheck.engines.unusable import Unusable
 from flexmb.scene.problems import closest
 
 if TYPE_CHECKING:  # names are looked up before anything that runs engines is imported
@@ -36,19 +39,22 @@ BUILT_IN = {
     "kratos": "crosscheck.engines.kratos:KratosEngine",
     "kane": "crosscheck.engines.kane:KaneEngine",
 }
+FMU = "fmu:"
+"""What the name of an engine begins with that is an FMU, or a mapping of one; the rest is its file."""
+FMU_ENGINE = "crosscheck.engines.fmu:FmuEngine"
 OWN_CODE = tuple(name for name, place in BUILT_IN.items() if place.startswith("crosscheck.engines.native:"))
 # For each engine the one whose library or compiled code it shares: both run in the same worker process.
 SERVED_WITH = dict.fromkeys(OWN_CODE, "native") | {"exudyn-beam": "exudyn"}
 
 
 class Engines(Mapping[str, "Engine"]):
-    """Engines by name, each loaded on first use."""
+    """Engines by name, each loaded on first use; besides those that it lists, every FMU by its file."""
 
     def __init__(self, loaders: dict[str, Callable[[], Engine]]) -> None:
         self._loaders = loaders
 
     def __getitem__(self, name: str) -> Engine:
-        return self._loaders[name]()
+        return _fmu(name) if is_fmu(name) else self._loaders[name]()
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._loaders)
@@ -57,14 +63,14 @@ class Engines(Mapping[str, "Engine"]):
         return len(self._loaders)
 
     def __contains__(self, name: object) -> bool:
-        return name in self._loaders
+        return name in self._loaders or (isinstance(name, str) and is_fmu(name))
 
 
 class NoSuchEngine(LookupError):
     """The provider has no engine of this name; the message names the nearest."""
 
 
-class BrokenPlugIn(RuntimeError):
+class BrokenPlugIn(Unusable):
     """A plug-in that cannot be used; the message names it and says why."""
 
 
@@ -107,8 +113,15 @@ def plug_ins() -> tuple[str, ...]:
     return tuple(_plug_ins())
 
 
+def is_fmu(name: str) -> bool:
+    """Whether an engine's name is that of an FMU by its file."""
+    return name.startswith(FMU) and len(name) > len(FMU)
+
+
 def home(name: str) -> str:
     """The module that makes the engine called `name`, "" if there is no such engine."""
+    if is_fmu(name):
+        return FMU_ENGINE.partition(":")[0]
     paths = [BUILT_IN[name]] if name in BUILT_IN else [point.value for point in _plug_ins().get(name, ())]
     return paths[0].partition(":")[0].strip() if len(paths) == 1 else ""
 
@@ -135,6 +148,12 @@ def known_engine(provider: str, name: str) -> Mapping[str, Engine]:
 def _built_in(path: str) -> Engine:
     module, _, name = path.partition(":")
     made: Engine = getattr(import_module(module), name)()
+    return made
+
+
+def _fmu(name: str) -> Engine:
+    module, _, kind = FMU_ENGINE.partition(":")
+    made: Engine = getattr(import_module(module), kind)(name)
     return made
 
 

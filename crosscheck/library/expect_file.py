@@ -36,6 +36,7 @@ from typing import Literal
 
 import msgspec
 
+from crosscheck.engines.registry import FMU
 from crosscheck.library.case_error import CaseError
 from crosscheck.library.read_file import struct_of
 
@@ -91,8 +92,10 @@ def read_expect_file(file: Path) -> ExpectFile:
 def goal_option(text: str) -> ExpectFile:
     """What `--goal ENGINE[:PATTERN]=NUMBER` says, for all cases; CaseError if it is no such text."""
     what, _, number = text.rpartition("=")
-    engine, _, pattern = what.partition(":")
-    if not engine:
+    mark, file = (FMU, what.removeprefix(FMU)) if what.startswith(FMU) else ("", what)  # its name has a colon itself
+    engine, _, pattern = file.partition(":")
+    engine = mark + engine
+    if engine == mark:
         raise CaseError(f"--goal {text}: write ENGINE=NUMBER or ENGINE:CHANNELS=NUMBER, such as mycode:load=1e-3")
     (value,) = _numbers("--goal", text, [number])
     entry = GoalEntry(engine=engine, goals={pattern or EVERY_CHANNEL: value}, reason=f"--goal {text}")

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import msgspec
 
-from crosscheck.engines.registry import BUILT_IN, home
+from crosscheck.engines.registry import BUILT_IN, home, is_fmu
 from crosscheck.library.own_files import source_folder
 from crosscheck.records.kinds import ContractState
 from crosscheck.records.made_by import made_by
@@ -55,8 +55,9 @@ def contracts(out: Path, engines: Iterable[str]) -> dict[str, ContractState]:
 
 
 def is_outside(name: str) -> bool:
-    """Whether an engine of that name comes from another distribution."""
-    return name not in BUILT_IN and bool(home(name))
+    """Whether an engine of that name comes from another distribution. An FMU is a model of one scene, and no code that
+    the clauses, which have scenes of their own, could be tried on."""
+    return name not in BUILT_IN and not is_fmu(name) and bool(home(name))
 
 
 def _state(name: str, last: Tried | None) -> ContractState:

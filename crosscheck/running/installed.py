@@ -12,12 +12,12 @@ from crosscheck.engines.registry import (
     BUILT_IN,
     OWN_CODE,
     PROVIDER,
-    BrokenPlugIn,
     NoSuchEngine,
     find_engine,
     known_engine,
     plug_ins,
 )
+from crosscheck.engines.unusable import Unusable
 from crosscheck.library.case_error import CaseError
 from crosscheck.running.pool import run_jobs
 from crosscheck.running.scheduler import Scheduler, Work
@@ -116,7 +116,7 @@ def _state(provider: str, name: str) -> EngineState:
         return EngineState(name, checked_version(engine_state.version()), "", summary)
     except EngineMissing as error:
         return EngineState(name, None, clean(str(error)), summary)
-    except BrokenPlugIn as error:
+    except Unusable as error:
         return _useless(name, str(error))
     except Exception as error:
         return _useless(name, describe(error))

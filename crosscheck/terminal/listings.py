@@ -41,6 +41,7 @@ def engines_table(states: Iterable[EngineState]) -> Listing:
     for state in states:
         version = words(state.absence, "yellow") if state.version is None else words(state.version, "green")
         table.add(state.name, state.summary, version, state.advice)
+    table.add("fmu:FILE", "any FMU of FMI 2 or 3, or a mapping of one", "", "")
     return table
 
 

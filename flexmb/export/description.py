@@ -57,7 +57,8 @@ def _lines(model: ExportedModel, guid: str, step: float, code: str) -> Iterator[
     yield '<LogCategories><Category name="logStatusError"/></LogCategories>'
     yield _experiment(model, step)
     yield '<VendorAnnotations><Tool name="flexmb">'
-    yield f'<digests scene="{model.digest}" code="{code}"/></Tool></VendorAnnotations>'
+    digests = f'scene="{model.digest}" model="{model.digest_of_model}" code="{code}"'
+    yield f"<digests {digests}/></Tool></VendorAnnotations>"
     yield "<ModelVariables>"
     for each in variables:
         yield each.text

@@ -21,6 +21,7 @@ from flexmb.run.times import Timing, timing_of
 from flexmb.scene.connectors import AlongHinge
 from flexmb.scene.files import dumps
 from flexmb.scene.schema import Scene
+from flexmb.scene.without_start import without_start
 from flexmb.system.compile import assembled, compile
 from flexmb.system.observables import ENERGIES
 from flexmb.system.system import System
@@ -53,8 +54,8 @@ class Output(NamedTuple):
 class ExportedModel(NamedTuple):
     """What is exported.
 
-    name: of the scene; identifier: as a name of C; digest: of the scene's text. states: q, u and work, the speeds after
-    `coordinates` of them. numbers: inputs and parameters. bodies, connectors: names for messages. fault: word with the
+    name: of the scene; identifier: as a name of C; digest: of the scene's text; digest_of_model: of that without
+    initial values. states: q, u and work, the speeds after `coordinates` of them. numbers: inputs and parameters. bodies, connectors: names for messages. fault: word with the
     number of the body that a failure is at. code: object file with functions <identifier>_kernel_rates, _outputs and
     _settle. closures: names of what closes a chain, none of a tree; branch: first word and length of the arrays that
     its motion is remembered in, by name. open_loads: why loads are no outputs, empty if they are.
@@ -64,6 +65,7 @@ class ExportedModel(NamedTuple):
     description: str
     identifier: str
     digest: str
+    digest_of_model: str
     states: tuple[Variable, ...]
     coordinates: int
     numbers: Numbers
@@ -135,7 +137,7 @@ def tabled(scene: Scene, inputs: Sequence[str] = ()) -> tuple[ExportedModel, tup
             )
         branch = _remembered(base, number_of(tables, closed.cw))
     return ExportedModel(
-        scene.name, scene.description, identifier, sha256(dumps(scene).encode()).hexdigest(), states, system.nq,
+        scene.name, scene.description, identifier, _digest(scene), _digest(without_start(scene)), states, system.nq,
         found, tuple(_outputs(system, tables[OUT], base, not open_loads)), base, timing_of(system), links,
         tuple(system.observed_names.connectors), base.word(number_of(tables, work), "fault"),
         tuple(each.name for each in system.scene.constraints), branch, open_loads, b"",
@@ -237,6 +239,10 @@ def _outputs(system: System, out: Any, block: Image, loads: bool) -> Iterator[Ou
         yield Output(f"energy.{name}", "J", place(out.energy[i:]))
     yield Output("energy.total", "J", TOTAL)
     yield from columns("momentum", "momentum", place(out.momentum), 6)
+
+
+def _digest(scene: Scene) -> str:
+    return sha256(dumps(scene).encode()).hexdigest()
 
 
 def _identifier(name: str) -> str:
