@@ -126,6 +126,9 @@ def export(
         list[str] | None,
         typer.Option("--slider", help="--page: a number to change, NAME or NAME=LOW,HIGH.", show_default=False),
     ] = None,
+    derivatives: Annotated[
+        bool, typer.Option("--derivatives", help="--fmu, --c: with derivatives by states and inputs; compiles longer.")
+    ] = False,
     no_user_code: NoUserCode = False,
 ) -> None:
     """
@@ -145,10 +148,10 @@ def export(
     **Exit code**: 0 written, 2 the scene or the body is wrong, or is not exported: the message has the remedy.
     """
     with no_traceback():
-        if (inputs and out is not None) or (step is not None and fmu is None and page is None):
-            raise ValueError("--input is for --fmu, --c and --page, --step for --fmu and --page")
-        if (target is not None and c is None) or (sliders and page is None):
-            raise ValueError("--target is for --c, --slider for --page")
+        if ((inputs or derivatives) and out is not None) or (step is not None and fmu is None and page is None):
+            raise ValueError("--input and --derivatives are not for --out, --step is for --fmu and --page")
+        if (target is not None and c is None) or (sliders and page is None) or (derivatives and page is not None):
+            raise ValueError("--target is for --c, --slider for --page, --derivatives for --fmu and --c")
         if sum(place is not None for place in (out, fmu, c, page)) != 1:
             raise ValueError("give one of --out FILE (with a BODY), --fmu FILE, --c FOLDER and --page FILE")
         if (body is None) != (out is None):
@@ -156,7 +159,7 @@ def export(
         if body is not None and out is not None:
             _export_body(scene, body, out, dialect)
         else:
-            _export_program(scene, fmu, c, page, inputs or [], step, target, sliders or [])
+            _export_program(scene, fmu, c, page, inputs or [], step, derivatives, target, sliders or [])
 
 
 def _export_body(scene: Path, body: str, out: Path, dialect: Literal["wallrapp", "fembs"]) -> None:
@@ -179,7 +182,7 @@ def _export_body(scene: Path, body: str, out: Path, dialect: Literal["wallrapp",
 
 def _export_program(
     scene: Path, fmu: Path | None, c: Path | None, page: Path | None, inputs: list[str], step: float | None,
-    target: str | None, sliders: list[str],
+    derivatives: bool, target: str | None, sliders: list[str],
 ) -> None:  # fmt: skip
     from flexmb.export.emitted import LEVEL
     from flexmb.export.web import export_page
@@ -192,14 +195,14 @@ def _export_program(
         if fmu is not None:
             check_folder(fmu.parent)
             folder(fmu.parent)
-            model = export_fmu(loaded, fmu, inputs=inputs, step=step)
+            model = export_fmu(loaded, fmu, inputs=inputs, step=step, derivatives=derivatives)
         elif page is not None:
             check_folder(page.parent)
             model = export_page(loaded, page, sliders=ranges, inputs=inputs, step=step)
         else:
             assert c is not None  # one of the four is given
             check_folder(c)
-            model = export_c(loaded, c, inputs=inputs, target=target or LEVEL)
+            model = export_c(loaded, c, inputs=inputs, derivatives=derivatives, target=target or LEVEL)
     numbers = model.numbers.changeable
     for what, names in (
         ("inputs", [each.candidate.name for each in numbers if each.candidate.is_input]),

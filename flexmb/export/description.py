@@ -43,7 +43,7 @@ def _lines(model: ExportedModel, guid: str, step: float, code: str) -> Iterator[
     )
     can = (
         f'modelIdentifier="{model.identifier}" canGetAndSetFMUstate="true" canSerializeFMUstate="true" '
-        'providesDirectionalDerivative="false"'
+        f'providesDirectionalDerivative="{str(model.tangent is not None).lower()}"'
     )
     yield f'<ModelExchange {can} completedIntegratorStepNotNeeded="{str(not model.branch).lower()}"/>'
     if step:

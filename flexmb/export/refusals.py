@@ -9,9 +9,13 @@ import sys
 
 from flexmb.scene.connectors import sticks
 from flexmb.scene.schema import Scene
+from flexmb.system.system import System
 
 INPUT_KEYS = ("function", "torque_Nm", "force_N")
 """Keys of the functions of time that may be inputs: of loads, and of motors and actuators."""
+
+MOST_SPEEDS = 300
+"""Of a scene whose derivatives are exported: an instance holds some 100 bytes for each pair of them."""
 
 
 class NotExportable(NotImplementedError):
@@ -44,6 +48,20 @@ def refuse(scene: Scene) -> None:
         )
     if not scene.bodies or not (scene.hinges or scene.wheels or scene.point_masses):
         raise NotExportable(f"{name} cannot be exported: it has nothing that moves; add a hinge")
+
+
+def refuse_derivatives(system: System) -> None:
+    """NotExportable for a scene that can be exported, but without derivatives."""
+    if system.nu > MOST_SPEEDS:
+        raise NotExportable(
+            f'scene "{system.scene.name}" has {system.nu} speeds, and derivatives by all of them are dense: they are '
+            f"exported of at most {MOST_SPEEDS}; leave the derivatives out"
+        )
+    try:
+        if system.constraints is not None:
+            system.constraints.require_rows("an export of derivatives")
+    except NotImplementedError as error:
+        raise NotExportable(f"{error}, or leave the derivatives out") from None
 
 
 def c_compiler() -> str:

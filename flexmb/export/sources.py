@@ -9,6 +9,8 @@ from math import inf
 import numpy as np
 
 from flexmb.export.model import ADVICE, OUT, C, ExportedModel, W
+from flexmb.jit.duals import DUAL
+from flexmb.linear.closed_loop import LARGE
 from flexmb.tables.status import Status
 
 PER_LINE = 8
@@ -21,6 +23,7 @@ def header(model: ExportedModel) -> str:
         "STATES": len(model.states), "COORDINATES": model.coordinates, "OUTPUTS": len(model.outputs),
         "INPUTS": sum(each.candidate.is_input for each in numbers), "NUMBERS": len(numbers),
         "BYTES": 8 * len(model.image.words), "REMEMBERED": sum(size for _, size in model.branch.values()),
+        "DERIVATIVES": int(model.tangent is not None),
     }  # fmt: skip
     text = _shared("core.h", model)
     for name, size in sizes.items():
@@ -67,6 +70,16 @@ def _tables(model: ExportedModel) -> Iterable[str]:
         ("FROM", _real(model.timing.start)), ("UNTIL", _real(model.timing.end)),
     ):  # fmt: skip
         yield f"#define {constant} {value}"
+    if tangent := model.tangent:
+        for constant, value in (
+            ("TANGENT", tangent.tables), ("DIFFERENTIATED", tangent.constants), ("JACOBIAN", tangent.jacobian),
+            ("DIRECTION", tangent.direction),
+            ("ENERGY_OUTPUT", [output.name for output in model.outputs].index("energy.kinetic")),
+            ("DUAL", DUAL.width), ("NONFINITE", int(Status.NONFINITE)), ("LARGE", _real(LARGE)),
+            ("INPUT_WORDS", sum(len(each.effects) for each in numbers if each.candidate.is_input)),
+        ):  # fmt: skip
+            yield f"#define {constant} {value}"
+        yield _array("int", "CHANGE", map(str, tangent.places))
     yield _array("double", "SWITCH", map(_real, model.timing.switches or (inf,)))
     yield _array("int", "PLACE", (str(output.word) for output in model.outputs))
     words = sorted({effect.word for each in numbers for effect in each.effects})

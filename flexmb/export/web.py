@@ -73,7 +73,7 @@ def export_page(
     refuse(scene)
     filmed = _filmed(scene)
     taken = step or _step(scene)
-    made_of = model(filmed, inputs, "wasm32")
+    made_of = model(filmed, inputs, target="wasm32")
     chosen = _sliders(made_of, sliders)
     text = _page(scene, filmed, made_of, chosen, taken)
     folder(file.parent)

@@ -28,33 +28,39 @@ FLAGS = (
 EPOCH = (1980, 1, 1, 0, 0, 0)  # of all files in an archive, so that equal scenes give equal archives
 
 
-def export_fmu(scene: Scene, path: Path, *, inputs: Sequence[str] = (), step: float | None = None) -> ExportedModel:
+def export_fmu(
+    scene: Scene, path: Path, *, inputs: Sequence[str] = (), step: float | None = None, derivatives: bool = False
+) -> ExportedModel:
     """Write a scene as an FMU of FMI 2.0 for Linux on x86-64, which needs no Python: docs/export-fmu.md.
 
     inputs: paths of loads, motors and actuators that are inputs instead of their functions of time; constant ones are
     inputs, too. step (s): the archive is for Co-Simulation, too, by the classical Runge-Kutta method in equal steps of
-    at most this size. Takes some 15 s of compiling for a kind of scene.
+    at most this size. derivatives: with directional derivatives by states and inputs. Takes some 15 s of compiling for
+    a kind of scene, with derivatives some 40 s.
 
-    Raises NotExportable, before anything is compiled, for controllers and events, another platform, and where no C
-    compiler is found; ClosureError for loops that cannot be closed or allow no motion; SceneError for a scene that is
-    wrong, PathError for an input that is not there, ValueError for a step that is not positive, OSError where the file
-    cannot be written.
+    Raises NotExportable, before anything is compiled, for controllers and events, another platform, where no C
+    compiler is found, and for derivatives of scenes that have none; ClosureError for loops that cannot be closed or
+    allow no motion; SceneError for a scene that is wrong, PathError for an input that is not there, ValueError for a
+    step that is not positive, OSError where the file cannot be written.
     """
     _check_step(step)
     c_compiler()
-    made_of = model(scene, inputs)
+    made_of = model(scene, inputs, derivatives)
     write_fmu(made_of, path, step)
     return made_of
 
 
-def export_c(scene: Scene, folder: Path, *, inputs: Sequence[str] = (), target: str = LEVEL) -> ExportedModel:
+def export_c(
+    scene: Scene, folder: Path, *, inputs: Sequence[str] = (), derivatives: bool = False, target: str = LEVEL
+) -> ExportedModel:
     """Write a scene as C into a folder: a header, its functions, an object file and an example program.
 
     The functions allocate nothing; an instance is one struct. Compile with `cc example.c NAME.c NAME_kernels.o -lm`.
-    target: the processors that the object file is for (`flexmb.export.emitted.TARGETS`), x86-64 by default. inputs and
-    errors: as of `export_fmu`; no C compiler is needed for the export itself. ValueError for another target.
+    target: the processors that the object file is for (`flexmb.export.emitted.TARGETS`), x86-64 by default. inputs,
+    derivatives and errors: as of `export_fmu`; no C compiler is needed for the export itself. ValueError for another
+    target.
     """
-    made_of = model(scene, inputs, target)
+    made_of = model(scene, inputs, derivatives, target)
     write_c(made_of, folder)
     return made_of
 

@@ -4,6 +4,11 @@ extern int32_t MODEL_kernel_rates(int64_t *, void **, double, int64_t, int64_t, 
 extern int32_t MODEL_kernel_outputs(int64_t *, void **, double, int64_t, int64_t, void *, void *, void *);
 extern int32_t MODEL_kernel_settle(int64_t *, void **, double, int64_t, int64_t, void *);
 
+#if MODEL_DERIVATIVES
+extern int32_t MODEL_kernel_derivatives(int64_t *, void **, double, int64_t, int64_t, void *, void *);
+extern int32_t MODEL_kernel_outputs_along(int64_t *, void **, double, int64_t, int64_t, void *, void *);
+#endif
+
 static unsigned char *memory_of(MODEL_instance *m) {
     return (unsigned char *)(((uintptr_t)m->memory + 63) & ~(uintptr_t)63);
 }
@@ -100,6 +105,87 @@ int MODEL_outputs(MODEL_instance *m, double t, const double *y, double *dy, doub
     }
     return 0;
 }
+
+#if MODEL_DERIVATIVES
+/* J at a state, in the memory of the instance. */
+static int differentiate(MODEL_instance *m, double t, const double *y) {
+    unsigned char *memory = memory_of(m);
+    const double *J = (const double *)memory + JACOBIAN;
+    double dy[MODEL_STATES];
+    int64_t result = 0;
+    void *error = NULL;
+    const int status = MODEL_rhs(m, t, y, dy); /* names what a failure is at */
+    if (status) return status;
+    defined(m, &t);
+    if (MODEL_kernel_derivatives(&result, &error, t, (int64_t)(uintptr_t)y, MODEL_STATES, memory + DIFFERENTIATED,
+                                 memory + TANGENT))
+        return -1;
+    for (size_t i = 0; !result && i < (size_t)MODEL_STATES * MODEL_STATES; i++)
+        if (!isfinite(J[i])) result = NONFINITE;
+    return (int)result;
+}
+
+int MODEL_jacobian(MODEL_instance *m, double t, const double *y, double *J) {
+    const int status = differentiate(m, t, y);
+    if (!status) memcpy(J, (double *)memory_of(m) + JACOBIAN, sizeof(double) * MODEL_STATES * MODEL_STATES);
+    return status;
+}
+
+/* Add what the inputs do, on which rates and outputs depend linearly: half the difference for large ones, beside which
+ * the rounding of all else is negligible. */
+static int add_inputs(MODEL_instance *m, double t, const double *y, const double *input, double *rates, double *outputs) {
+    double *words = (double *)memory_of(m), before[INPUT_WORDS + 1], dy[2][MODEL_STATES], out[2][MODEL_OUTPUTS];
+    double size = 0.0;
+    int status = 0;
+    for (int i = 0; i < MODEL_INPUTS; i++) size = fmax(size, fabs(input[i]));
+    if (size == 0.0) return 0;
+    for (int n = 0; n < INPUT_WORDS; n++) before[n] = words[WORDS[TOUCHED[n]]];
+    for (int side = 0; side < 2 && !status; side++) {
+        for (int i = 0; i < MODEL_INPUTS; i++)
+            for (int n = TOUCHES[i]; n < TOUCHES[i + 1]; n++)
+                for (int k = EFFECTS[TOUCHED[n]]; k < EFFECTS[TOUCHED[n] + 1]; k++)
+                    if (OF_NUMBER[k] == i) words[WORDS[TOUCHED[n]]] += (side ? -LARGE : LARGE) * SLOPE[k] * (input[i] / size);
+        status = outputs ? MODEL_outputs(m, t, y, dy[side], out[side]) : MODEL_rhs(m, t, y, dy[side]);
+        for (int n = 0; n < INPUT_WORDS; n++) words[WORDS[TOUCHED[n]]] = before[n];
+    }
+    if (status) return status;
+    for (int i = 0; i < MODEL_STATES; i++) rates[i] += size * ((dy[0][i] - dy[1][i]) / (2.0 * LARGE));
+    for (int i = 0; outputs && i < MODEL_OUTPUTS; i++) outputs[i] += size * ((out[0][i] - out[1][i]) / (2.0 * LARGE));
+    return 0;
+}
+
+int MODEL_along(MODEL_instance *m, double t, const double *y, int fresh, const double *state, const double *input,
+                double *rates, double *outputs) {
+    unsigned char *memory = memory_of(m);
+    double *words = (double *)memory;
+    const double *J = words + JACOBIAN;
+    int64_t result = 0;
+    void *error = NULL;
+    int status = fresh ? differentiate(m, t, y) : 0;
+    if (status) return status;
+    for (int i = 0; i < MODEL_STATES; i++) {
+        rates[i] = 0.0;
+        for (int k = 0; k < MODEL_STATES; k++) rates[i] += J[(size_t)i * MODEL_STATES + k] * state[k];
+    }
+    if (outputs) {
+        double at = t;
+        defined(m, &at);
+        memcpy(words + DIRECTION, state, MODEL_STATES * sizeof(double));
+        if (MODEL_kernel_outputs_along(&result, &error, at, (int64_t)(uintptr_t)y, MODEL_STATES,
+                                       memory + DIFFERENTIATED, memory + TANGENT))
+            return -1;
+        if (result) return (int)result;
+        for (int i = 0; i < MODEL_OUTPUTS; i++) {
+            outputs[i] = 0.0;
+            if (CHANGE[i] >= 0)
+                outputs[i] = words[CHANGE[i]];
+            else /* the sum of the energies, whose derivatives have the places of dual numbers */
+                for (int k = 0; k < 4; k++) outputs[i] += words[CHANGE[ENERGY_OUTPUT] + DUAL * k];
+        }
+    }
+    return add_inputs(m, t, y, input, rates, outputs);
+}
+#endif
 
 double MODEL_next_switch(double t) {
     for (int i = 0; i < SWITCHES; i++)

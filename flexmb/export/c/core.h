@@ -23,6 +23,7 @@ extern "C" {
 #define MODEL_OUTPUTS @OUTPUTS@
 #define MODEL_BYTES @BYTES@
 #define MODEL_REMEMBERED @REMEMBERED@ /* numbers of MODEL_remember, 0 unless the model has closed loops */
+#define MODEL_DERIVATIVES @DERIVATIVES@ /* 1 if the model has the functions of derivatives */
 
 #define MODEL_OUT_OF_TIME (-2) /* a table of the scene does not reach there */
 
@@ -51,6 +52,15 @@ void MODEL_set(MODEL_instance *m, int number, double value);
 int MODEL_rhs(MODEL_instance *m, double t, const double *y, double *dy);
 /* The same, and all outputs. */
 int MODEL_outputs(MODEL_instance *m, double t, const double *y, double *dy, double *out);
+#if MODEL_DERIVATIVES
+/* J (MODEL_STATES, MODEL_STATES), row by row: derivatives of dy/dt by y. At a corner of a law those of one side. */
+int MODEL_jacobian(MODEL_instance *m, double t, const double *y, double *J);
+/* Changes of dy/dt (MODEL_STATES) and, unless `outputs` is NULL, of the outputs, in the direction in which y changes by
+ * `state` (MODEL_STATES) and the inputs change by `input` (MODEL_INPUTS). `fresh` is 0 if the derivatives are those at
+ * the state, time and numbers of the last call of this function or of MODEL_jacobian. */
+int MODEL_along(MODEL_instance *m, double t, const double *y, int fresh, const double *state, const double *input,
+                double *rates, double *outputs);
+#endif
 /* Quaternions get unit length, prescribed motions their values, loops are closed. Of a model with loops call it after
  * each step: it also chooses the rows of the closures for the next one, and steps that turn these too far fail. */
 int MODEL_settle(MODEL_instance *m, double t, double *y);

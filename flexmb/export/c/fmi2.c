@@ -37,7 +37,7 @@ typedef struct {
     MODEL_instance model;
     Values v;
     double dy[N], out[MODEL_OUTPUTS];
-    int known, logging, is_cs;
+    int known, differentiated, logging, is_cs;
     double reached;
     fmi2CallbackFunctions call;
     char name[128];
@@ -65,6 +65,12 @@ static fmi2Status out_of_order(Instance *c, const char *function) {
     if (!c) return fmi2Error; \
     if (!(c->v.phase & (phases))) return out_of_order(c, __func__)
 
+/* Nothing is known of the present time, state and numbers. */
+static void stale(Instance *c) {
+    c->known = STALE;
+    c->differentiated = 0;
+}
+
 static void begin(Instance *c) {
     MODEL_init(&c->model);
     memset(&c->v, 0, sizeof c->v);
@@ -75,7 +81,7 @@ static void begin(Instance *c) {
     c->v.tolerance = 1e-8; /* as modelDescription.xml says */
     c->v.last = INFINITY;
     c->v.phase = INSTANTIATED;
-    c->known = STALE;
+    stale(c);
 }
 
 API const char *fmi2GetTypesPlatform(void) { return "default"; }
@@ -139,7 +145,7 @@ static fmi2Status settle(Instance *c) {
     MODEL_segment(&c->model, c->v.t);
     c->v.last = c->model.last;
     const int status = MODEL_begin(&c->model, c->v.t, c->v.y);
-    c->known = STALE;
+    stale(c);
     return status ? failed(c, status) : fmi2OK;
 }
 
@@ -225,7 +231,7 @@ API fmi2Status fmi2SetReal(void *component, const fmi2ValueReference vr[], size_
             c->v.step = value[i];
         } else
             return fail(c, "no real variable of this value reference can be set");
-        c->known = STALE;
+        stale(c);
     }
     return fmi2OK;
 }
@@ -247,7 +253,7 @@ static void restore(Instance *c, const Values *v) {
     for (int i = 0; i < MODEL_NUMBERS; i++) MODEL_set(&c->model, i, v->number[i]);
     MODEL_recall(&c->model, v->remembered);
     c->model.last = v->last;
-    c->known = STALE;
+    stale(c);
 }
 
 API fmi2Status fmi2GetFMUstate(void *component, void **state) {
@@ -298,11 +304,46 @@ API fmi2Status fmi2DeSerializeFMUstate(void *component, const char bytes[], size
     return fmi2OK;
 }
 
+#if MODEL_DERIVATIVES
+/* The place of a variable in the direction; NULL, with a message, if nothing is differentiated by it. */
+static double *known_at(Instance *c, unsigned int r, double *state, double *input) {
+    if (r < RATE) return state + r;
+    if (r >= NUMBER && r < NUMBER + MODEL_INPUTS) return input + (r - NUMBER);
+    char text[300];
+    const char *name = r >= NUMBER && r < OUTPUT ? MODEL_number_names[r - NUMBER] : "this variable";
+    snprintf(text, sizeof text, "derivatives are by states and inputs, not by %s", name);
+    fail(c, text);
+    return NULL;
+}
+#endif
+
 API fmi2Status fmi2GetDirectionalDerivative(void *component, const fmi2ValueReference *z, size_t nz,
                                             const fmi2ValueReference *v, size_t nv, const double *dv, double *dz) {
+    IN(INITIALISING | EVENTS | CONTINUOUS | STEPPING);
+#if MODEL_DERIVATIVES
+    double state[N] = {0.0}, input[MODEL_INPUTS + 1] = {0.0}, rates[N], out[MODEL_OUTPUTS];
+    int seen = 0;
+    for (size_t i = 0; i < nv; i++) {
+        double *place = known_at(c, v[i], state, input);
+        if (!place) return fmi2Error;
+        *place += dv[i];
+    }
+    for (size_t i = 0; i < nz; i++) {
+        if (z[i] >= STEP_SIZE || (z[i] >= NUMBER && z[i] < OUTPUT))
+            return fail(c, "derivatives are of states, their rates and outputs, not of inputs and parameters");
+        seen |= z[i] >= OUTPUT;
+    }
+    if (c->v.phase == INITIALISING && settle(c) != fmi2OK) return fmi2Error;
+    const int status = MODEL_along(&c->model, c->v.t, c->v.y, !c->differentiated, state, input, rates, seen ? out : NULL);
+    c->differentiated = !status;
+    if (status) return failed(c, status);
+    for (size_t i = 0; i < nz; i++)
+        dz[i] = z[i] < RATE ? state[z[i]] : z[i] < NUMBER ? rates[z[i] - RATE] : out[z[i] - OUTPUT];
+    return fmi2OK;
+#else
     (void)z, (void)nz, (void)v, (void)nv, (void)dv, (void)dz;
-    IN(~0);
-    return fail(c, "this model provides no directional derivatives, as modelDescription.xml says");
+    return fail(c, "this model provides no directional derivatives: export it with --derivatives");
+#endif
 }
 
 /* Model Exchange */
@@ -318,7 +359,7 @@ API fmi2Status fmi2NewDiscreteStates(void *component, fmi2EventInfo *info) {
     const double next = MODEL_next_switch(c->v.t);
     MODEL_segment(&c->model, c->v.t);
     c->v.last = c->model.last;
-    c->known = STALE;
+    stale(c);
     memset(info, 0, sizeof *info);
     if (c->v.drifted) {
         const int status = MODEL_settle(&c->model, c->v.t, c->v.y);
@@ -348,13 +389,13 @@ API fmi2Status fmi2CompletedIntegratorStep(void *component, fmi2Boolean keeps, f
     if (status) return failed(c, status);
     for (int i = 0; i < N; i++)
         if (fabs(closed[i] - c->v.y[i]) > c->v.tolerance * fmax(1.0, fabs(closed[i]))) c->v.drifted = *events = 1;
-    c->known = STALE;
+    stale(c);
     return fmi2OK;
 }
 
 API fmi2Status fmi2SetTime(void *component, double t) {
     IN(EVENTS | CONTINUOUS);
-    if (t != c->v.t) c->known = STALE;
+    if (t != c->v.t) stale(c);
     c->v.t = t;
     return fmi2OK;
 }
@@ -363,7 +404,7 @@ API fmi2Status fmi2SetContinuousStates(void *component, const double y[], size_t
     IN(EVENTS | CONTINUOUS);
     if (count != N) return fail(c, "the number of states is another one");
     memcpy(c->v.y, y, sizeof c->v.y);
-    c->known = STALE;
+    stale(c);
     return fmi2OK;
 }
 
@@ -408,7 +449,7 @@ API fmi2Status fmi2DoStep(void *component, double t, double size, fmi2Boolean ke
     if (!status) status = MODEL_run(&c->model, t, t + size, c->v.step, c->v.y, &c->v.t);
     c->v.last = c->model.last;
     c->reached = c->v.t;
-    c->known = STALE;
+    stale(c);
     if (status) {
         c->v.phase = FAILED;
         return failed(c, status);

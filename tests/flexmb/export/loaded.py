@@ -111,6 +111,15 @@ class Instance:
         self.do("fmi2GetDerivatives", _pointer(dy), ct.c_size_t(len(y)))
         return dy
 
+    def along(self, unknowns: list[str], direction: dict[str, float]) -> Any:
+        """Changes (n,) of variables by name in a direction, in which others change so much."""
+        of, by = ((ct.c_uint * len(names))(*(self.fmu.numbers[name] for name in names))
+                  for names in (unknowns, direction))  # fmt: skip
+        change, known = np.empty(len(unknowns)), np.array(list(direction.values()), float)
+        counts = ct.c_size_t(len(unknowns)), ct.c_size_t(len(direction))
+        self.do("fmi2GetDirectionalDerivative", of, counts[0], by, counts[1], _pointer(known), _pointer(change))
+        return change
+
     def states(self, count: int) -> Any:
         """The present state (count,)."""
         y = np.empty(count)

@@ -11,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 from scipy.integrate import DOP853
@@ -18,7 +19,9 @@ from scipy.integrate import DOP853
 import flexmb as fm
 from flexmb.export import writing
 from flexmb.export.model import ExportedModel, model, tabled
+from flexmb.export.refusals import NotExportable
 from tests.flexmb.closure import mechanisms
+from tests.flexmb.export.differentiated import errors
 from tests.flexmb.export.loaded import SIMULATION, EventInfo, Fmu
 
 COMPILER = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
@@ -42,7 +45,7 @@ def scene() -> fm.Scene:
 
 @pytest.fixture(scope="module")
 def exported(scene: fm.Scene) -> ExportedModel:
-    return model(scene)
+    return model(scene, derivatives=True)
 
 
 @pytest.fixture(scope="module")
@@ -75,6 +78,20 @@ def test_co_simulation_takes_the_steps_of_a_run(scene: fm.Scene, fmu: Fmu) -> No
     for name in ("drive", "pin", "loop"):
         assert instance.get(*spatial(name)) == pytest.approx(run.loads[name][-1], rel=1e-8, abs=1e-9)
     assert instance.get("energy.total") == pytest.approx(run.total_energy[-1], rel=1e-11)
+
+
+def test_directional_derivatives_are_those_of_the_system(scene: fm.Scene, fmu: Fmu) -> None:
+    system, instance = fm.compile(scene), fmu.instance(SIMULATION).start()
+    instance.do("fmi2DoStep", ct.c_double(0.0), ct.c_double(0.1), 1)
+    y = instance.states(count(fmu))
+    state = system.state(y[: system.nq], y[system.nq : -1], 0.1)
+    found = errors(instance, system, state)
+    assert {"loop.force.x", "pin.torque.z", "energy.kinetic", "joint.position.x"} <= set(found)
+    assert max(found.values()) < 1e-11, sorted(found.items(), key=lambda each: -each[1])[:5]
+    rates = {name: error for name, error in found.items() if name.startswith("der(")}
+    assert max(rates.values()) < 1e-12
+    instance.do("fmi2DoStep", ct.c_double(0.1), ct.c_double(0.01), 1)
+    assert max(errors(instance, system, state).values()) > 1e-3  # of that state only
 
 
 def test_an_integrator_of_another_tool_comes_to_the_same_end(scene: fm.Scene, fmu: Fmu) -> None:
@@ -175,6 +192,14 @@ def test_c_runs_as_the_scene(exported: ExportedModel, scene: fm.Scene, tmp_path:
     run = fm.simulate(scene, END, "rk4", step=STEP, samples=2)
     for names, row in ((run.q_names, run.q[-1]), (run.u_names, run.u[-1])):
         assert [float(found[each]) for each, _ in names] == pytest.approx(row, rel=1e-11, abs=1e-12)
+
+
+def test_derivatives_of_undeformed_inertia_are_refused_with_the_remedy(monkeypatch: Any) -> None:
+    beams = mechanisms.tilted_four_bar(flexible=True, drive=None)
+    bodies = tuple(msgspec.structs.replace(body, level="ruthless") for body in beams.bodies)
+    monkeypatch.setattr("flexmb.export.model._code", lambda *_: pytest.fail("compiled"))
+    with pytest.raises(NotExportable, match="leave the derivatives out"):
+        model(msgspec.structs.replace(beams, bodies=bodies), derivatives=True)
 
 
 def test_loads_that_are_not_determined_are_left_out_and_said(exported: ExportedModel) -> None:

@@ -81,7 +81,7 @@ def test_another_target_is_refused_with_the_nearest(tmp_path: Path) -> None:
 def test_a_page_says_what_is_wrong_with_what_it_is_asked(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ready: ExportedModel, words: list[str], said: str
 ) -> None:
-    monkeypatch.setattr(web, "model", lambda *_: ready)
+    monkeypatch.setattr(web, "model", lambda *_, **__: ready)
     monkeypatch.setattr(web, "compiler", lambda: ["true"])
     page = tmp_path / "page.html"
     refused = CliRunner().invoke(app, ["export", str(_file(tmp_path)), "--page", str(page), *words])
@@ -99,7 +99,7 @@ def test_a_page_without_its_compiler_is_refused_before_anything_is_compiled(
 
 @pytest.fixture(scope="module")
 def ready() -> ExportedModel:
-    return model(web._filmed(arm()), (), "wasm32")
+    return model(web._filmed(arm()), target="wasm32")
 
 
 class Module:
