@@ -102,7 +102,7 @@ def export(
         Literal["wallrapp", "fembs"],
         typer.Option(help="wallrapp: J 3 x 3, columns of Gr and Ge by mode; fembs: J 6 x 1, columns by axis."),
     ] = "wallrapp",
-    fmu: Annotated[Path | None, typer.Option(help="Write the scene as an FMU (FMI 2.0).", show_default=False)] = None,
+    fmu: Annotated[Path | None, typer.Option(help="Write the scene as an FMU.", show_default=False)] = None,
     c: Annotated[
         Path | None, typer.Option("--c", help="Folder for the scene as C, with one header.", show_default=False)
     ] = None,
@@ -126,6 +126,7 @@ def export(
         list[str] | None,
         typer.Option("--slider", help="--page: a number to change, NAME or NAME=LOW,HIGH.", show_default=False),
     ] = None,
+    fmi: Annotated[Literal["2", "3"], typer.Option("--fmi", help="--fmu: FMI 2.0 or 3.0.")] = "2",
     derivatives: Annotated[
         bool, typer.Option("--derivatives", help="--fmu, --c: with derivatives by states and inputs; compiles longer.")
     ] = False,
@@ -152,6 +153,8 @@ def export(
             raise ValueError("--input and --derivatives are not for --out, --step is for --fmu and --page")
         if (target is not None and c is None) or (sliders and page is None) or (derivatives and page is not None):
             raise ValueError("--target is for --c, --slider for --page, --derivatives for --fmu and --c")
+        if fmi != "2" and fmu is None:
+            raise ValueError("--fmi is for --fmu")
         if sum(place is not None for place in (out, fmu, c, page)) != 1:
             raise ValueError("give one of --out FILE (with a BODY), --fmu FILE, --c FOLDER and --page FILE")
         if (body is None) != (out is None):
@@ -159,7 +162,7 @@ def export(
         if body is not None and out is not None:
             _export_body(scene, body, out, dialect)
         else:
-            _export_program(scene, fmu, c, page, inputs or [], step, derivatives, target, sliders or [])
+            _export_program(scene, fmu, c, page, inputs or [], step, derivatives, fmi, target, sliders or [])
 
 
 def _export_body(scene: Path, body: str, out: Path, dialect: Literal["wallrapp", "fembs"]) -> None:
@@ -182,7 +185,7 @@ def _export_body(scene: Path, body: str, out: Path, dialect: Literal["wallrapp",
 
 def _export_program(
     scene: Path, fmu: Path | None, c: Path | None, page: Path | None, inputs: list[str], step: float | None,
-    derivatives: bool, target: str | None, sliders: list[str],
+    derivatives: bool, fmi: Literal["2", "3"], target: str | None, sliders: list[str],
 ) -> None:  # fmt: skip
     from flexmb.export.emitted import LEVEL
     from flexmb.export.web import export_page
@@ -195,7 +198,7 @@ def _export_program(
         if fmu is not None:
             check_folder(fmu.parent)
             folder(fmu.parent)
-            model = export_fmu(loaded, fmu, inputs=inputs, step=step, derivatives=derivatives)
+            model = export_fmu(loaded, fmu, inputs=inputs, step=step, derivatives=derivatives, fmi=fmi)
         elif page is not None:
             check_folder(page.parent)
             model = export_page(loaded, page, sliders=ranges, inputs=inputs, step=step)

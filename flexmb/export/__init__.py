@@ -7,7 +7,7 @@ image.py        the tables of a system as one block of memory, with the places o
 numbers.py      numbers of a scene that are changed by writing into that block: inputs and parameters
 model.py        all of these together, with names and units: what is exported
 sources.py      a model as C: header, tables, example
-description.py  a model as `modelDescription.xml` of FMI 2.0
+description.py  a model as `modelDescription.xml` of FMI 2.0 or 3.0
 writing.py      `export_fmu` and `export_c`: the archive, or the folder of sources
 web.py          `export_page`: a page that computes the model, by WebAssembly
 c/              what is the same for all models

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from hashlib import sha256
 from typing import Any, NamedTuple
 
@@ -74,10 +74,11 @@ class ExportedModel(NamedTuple):
 
     name: of the scene; identifier: as a name of C; digest: of the scene's text; digest_of_model: of that without
     initial values. states: q, u and work, the speeds after `coordinates` of them. numbers: inputs and parameters.
-    bodies, connectors: names for messages. fault: word with the number of the body that a failure is at. code: object file with functions <identifier>_kernel_rates, _outputs and
-    _settle, with derivatives also _derivatives and _outputs_along. closures: names of what closes a chain, none of a
-    tree; branch: first word and length of the arrays that its motion is remembered in, by name. open_loads: why loads
-    are no outputs, empty if they are. tangent: of derivatives, None if there are none.
+    bodies, connectors: names for messages. fault: word with the number of the body that a failure is at. code: object
+    file with functions <identifier>_kernel_rates, _outputs and _settle, with derivatives also _derivatives and
+    _outputs_along. closures: names of what closes a chain, none of a tree; branch: first word and length of the arrays
+    that its motion is remembered in, by name. open_loads: why loads are no outputs, empty if they are. tangent: of
+    derivatives, None if there are none.
     """
 
     name: str
@@ -255,7 +256,7 @@ def _code(identifier: str, kinds: tuple[Any, ...], target: str) -> bytes:
     if c.of is Closed:
         rates, outputs, settle = entry.chain_rates, entry.chain_outputs, entry.chain_settle
         derivatives, along = entry.chain_derivatives, entry.chain_outputs_along
-    entries = {
+    entries: dict[str, tuple[Callable[..., Any], tuple[Any, ...]]] = {
         f"{identifier}_kernel_rates": (rates, (*state, WHOLE, c, w)),
         f"{identifier}_kernel_outputs": (outputs, (*state, c, w, out)),
         f"{identifier}_kernel_settle": (settle, (*state, c)),

@@ -8,6 +8,7 @@ from math import inf
 
 import numpy as np
 
+from flexmb.export.description import Version
 from flexmb.export.model import ADVICE, OUT, C, ExportedModel, W
 from flexmb.jit.duals import DUAL
 from flexmb.linear.closed_loop import LARGE
@@ -36,10 +37,15 @@ def core(model: ExportedModel) -> str:
     return "\n".join([*_tables(model), _shared("core.c", model)])
 
 
-def fmi2(model: ExportedModel, guid: str, step: float) -> str:
-    """The functions of FMI 2.0, to be appended to `core`; step (s): of Co-Simulation, 0 for none."""
+def instance(model: ExportedModel) -> str:
+    """What the versions of FMI have in common, which `interface` includes."""
+    return _shared("instance.c", model)
+
+
+def interface(model: ExportedModel, version: Version, guid: str, step: float) -> str:
+    """The functions of FMI, to be appended to `core`; step (s): of Co-Simulation, 0 for none."""
     name = model.identifier
-    return f'#define {name}_GUID "{guid}"\n#define STEP {_real(step)}\n' + _shared("fmi2.c", model)
+    return f'#define {name}_GUID "{guid}"\n#define STEP {_real(step)}\n' + _shared(f"fmi{version}.c", model)
 
 
 def example(model: ExportedModel) -> str:
@@ -67,6 +73,7 @@ def _tables(model: ExportedModel) -> Iterable[str]:
         ("ENERGY", model.outputs_at("energy.kinetic")), ("FAULT", model.fault),
         ("BEFORE", model.branch["time"][0] if model.branch else 0), ("SWITCHES", len(model.timing.switches)),
         ("SINGULAR", int(Status.CLOSURE_SINGULAR)), ("BRANCH", int(Status.BRANCH_UNKNOWN)),
+        ("NONFINITE", int(Status.NONFINITE)),
         ("FROM", _real(model.timing.start)), ("UNTIL", _real(model.timing.end)),
     ):  # fmt: skip
         yield f"#define {constant} {value}"
@@ -75,7 +82,7 @@ def _tables(model: ExportedModel) -> Iterable[str]:
             ("TANGENT", tangent.tables), ("DIFFERENTIATED", tangent.constants), ("JACOBIAN", tangent.jacobian),
             ("DIRECTION", tangent.direction),
             ("ENERGY_OUTPUT", [output.name for output in model.outputs].index("energy.kinetic")),
-            ("DUAL", DUAL.width), ("NONFINITE", int(Status.NONFINITE)), ("LARGE", _real(LARGE)),
+            ("DUAL", DUAL.width), ("LARGE", _real(LARGE)),
             ("INPUT_WORDS", sum(len(each.effects) for each in numbers if each.candidate.is_input)),
         ):  # fmt: skip
             yield f"#define {constant} {value}"

@@ -11,11 +11,11 @@ from html import escape
 from math import inf
 from pathlib import Path
 
-from flexmb.export.description import LICENSE, description
+from flexmb.export.description import LICENSE, Version, description
 from flexmb.export.emitted import LEVEL
 from flexmb.export.model import ExportedModel, model
 from flexmb.export.refusals import NotExportable, c_compiler
-from flexmb.export.sources import core, example, fmi2, header
+from flexmb.export.sources import core, example, header, instance, interface
 from flexmb.output.files import folder as made
 from flexmb.output.files import whole_file, write_whole
 from flexmb.scene.schema import Scene
@@ -25,13 +25,16 @@ FLAGS = (
     "-Wl,-z,noexecstack", "-Wl,-z,defs",
 )  # fmt: skip
 """For a library that names neither a folder nor a machine: no debugging information, no number of the build."""
+PLATFORM: dict[Version, str] = {"2": "linux64", "3": "x86_64-linux"}
+"""The folder of a library."""
 EPOCH = (1980, 1, 1, 0, 0, 0)  # of all files in an archive, so that equal scenes give equal archives
 
 
 def export_fmu(
-    scene: Scene, path: Path, *, inputs: Sequence[str] = (), step: float | None = None, derivatives: bool = False
-) -> ExportedModel:
-    """Write a scene as an FMU of FMI 2.0 for Linux on x86-64, which needs no Python: docs/export-fmu.md.
+    scene: Scene, path: Path, *, inputs: Sequence[str] = (), step: float | None = None, derivatives: bool = False,
+    fmi: Version = "2",
+) -> ExportedModel:  # fmt: skip
+    """Write a scene as an FMU for Linux on x86-64, which needs no Python: docs/export-fmu.md. fmi: "2", or "3" for 3.0.
 
     inputs: paths of loads, motors and actuators that are inputs instead of their functions of time; constant ones are
     inputs, too. step (s): the archive is for Co-Simulation, too, by the classical Runge-Kutta method in equal steps of
@@ -46,7 +49,7 @@ def export_fmu(
     _check_step(step)
     c_compiler()
     made_of = model(scene, inputs, derivatives)
-    write_fmu(made_of, path, step)
+    write_fmu(made_of, path, step, fmi)
     return made_of
 
 
@@ -65,16 +68,16 @@ def export_c(
     return made_of
 
 
-def write_fmu(model: ExportedModel, path: Path, step: float | None = None) -> None:
+def write_fmu(model: ExportedModel, path: Path, step: float | None = None, fmi: Version = "2") -> None:
     """Write a model as `export_fmu` does."""
     _check_step(step)
     size = step or 0.0
-    parts = header(model), core(model), fmi2(model, "", size)
+    parts = header(model), core(model), instance(model), interface(model, fmi, "", size)
     code = sha256("".join(parts).encode() + model.code).hexdigest()
     guid = "{" + "-".join((code[:8], code[8:12], code[12:16], code[16:20], code[20:32])) + "}"
     contents = {
-        "modelDescription.xml": description(model, guid, size, code).encode(),
-        f"binaries/linux64/{model.identifier}.so": _library(c_compiler(), model, guid, size),
+        "modelDescription.xml": description(model, fmi, guid, size, code).encode(),
+        f"binaries/{PLATFORM[fmi]}/{model.identifier}.so": _library(c_compiler(), model, fmi, guid, size),
         "documentation/index.html": _page(model).encode(),
         "documentation/licenses/license.txt": f"{LICENSE}\n".encode(),
     }
@@ -99,13 +102,14 @@ def _check_step(step: float | None) -> None:
         raise ValueError(f"step is {step:g} s: give a positive one, or leave it out for Model Exchange only")
 
 
-def _library(compiler: str, model: ExportedModel, guid: str, step: float) -> bytes:
+def _library(compiler: str, model: ExportedModel, fmi: Version, guid: str, step: float) -> bytes:
     """The shared library; its sources lie in a folder that does not outlive it, and are named without it."""
     name = model.identifier
     with tempfile.TemporaryDirectory() as place:
         work = Path(place)
         write_whole(work / f"{name}.h", header(model))
-        write_whole(work / "model.c", core(model) + "\n" + fmi2(model, guid, step))
+        write_whole(work / "instance.c", instance(model))
+        write_whole(work / "model.c", core(model) + "\n" + interface(model, fmi, guid, step))
         write_whole(work / "kernels.o", model.code)
         command = [compiler, *FLAGS, "-o", f"{name}.so", "model.c", "kernels.o", "-lm"]
         done = subprocess.run(command, cwd=work, capture_output=True, text=True, errors="replace")

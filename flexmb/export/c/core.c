@@ -13,6 +13,12 @@ static unsigned char *memory_of(MODEL_instance *m) {
     return (unsigned char *)(((uintptr_t)m->memory + 63) & ~(uintptr_t)63);
 }
 
+static int all_finite(const double *values, size_t count) {
+    for (size_t i = 0; i < count; i++)
+        if (!isfinite(values[i])) return 0;
+    return 1;
+}
+
 void MODEL_init(MODEL_instance *m) {
     unsigned char *memory = memory_of(m);
     memcpy(memory, IMAGE, sizeof IMAGE);
@@ -120,8 +126,7 @@ static int differentiate(MODEL_instance *m, double t, const double *y) {
     if (MODEL_kernel_derivatives(&result, &error, t, (int64_t)(uintptr_t)y, MODEL_STATES, memory + DIFFERENTIATED,
                                  memory + TANGENT))
         return -1;
-    for (size_t i = 0; !result && i < (size_t)MODEL_STATES * MODEL_STATES; i++)
-        if (!isfinite(J[i])) result = NONFINITE;
+    if (!result && !all_finite(J, (size_t)MODEL_STATES * MODEL_STATES)) return NONFINITE;
     return (int)result;
 }
 
@@ -198,12 +203,6 @@ void MODEL_segment(MODEL_instance *m, double t) {
     m->last = isinf(next) ? next : nextafter(next, t);
 }
 
-static int all_finite(const double *y) {
-    for (int i = 0; i < MODEL_STATES; i++)
-        if (!isfinite(y[i])) return 0;
-    return 1;
-}
-
 /* One step from y to stage[5]. The formulas are those of flexmb's method "rk4". */
 static int step_of(MODEL_instance *m, double t, const double *y, double h) {
     double (*k)[MODEL_STATES] = m->stage, *trial = m->stage[4];
@@ -216,7 +215,7 @@ static int step_of(MODEL_instance *m, double t, const double *y, double h) {
     }
     for (int i = 0; i < MODEL_STATES; i++)
         m->stage[5][i] = y[i] + h / 6.0 * (k[0][i] + 2.0 * (k[1][i] + k[2][i]) + k[3][i]);
-    return all_finite(m->stage[5]) ? 0 : 2;
+    return all_finite(m->stage[5], MODEL_STATES) ? 0 : NONFINITE;
 }
 
 int MODEL_run(MODEL_instance *m, double t, double t_end, double step, double *y, double *reached) {

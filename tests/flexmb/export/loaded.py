@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes as ct
 import xml.etree.ElementTree as ET
 import zipfile
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +37,8 @@ class EventInfo(ct.Structure):
 class Fmu:
     """An archive, unpacked: its library, and its variables by name."""
 
+    FOLDER = "linux64"
+
     def __init__(self, path: Path, folder: Path) -> None:
         with zipfile.ZipFile(path) as archive:
             archive.extractall(folder)
@@ -45,9 +48,8 @@ class Fmu:
         self.numbers = {each.get("name"): int(each.get("valueReference", "")) for each in variables}
         self.causality = {each.get("name"): each.get("causality") for each in variables}
         self.unit = {each.get("name"): each[0].get("unit") for each in variables}
-        [library] = (folder / "binaries" / "linux64").iterdir()
+        [library] = (folder / "binaries" / self.FOLDER).iterdir()
         self.library = ct.CDLL(str(library))
-        self.library.fmi2Instantiate.restype = ct.c_void_p
 
     def instance(self, kind: int = EXCHANGE, guid: str | None = None) -> Instance:
         """A new instance."""
@@ -67,6 +69,7 @@ class Instance:
 
         self._callbacks = Callbacks(LOGGER(log), ALLOCATE(libc.calloc), FREE(libc.free), None, None)
         call = fmu.library.fmi2Instantiate
+        call.restype = ct.c_void_p
         self.address = call(b"one", kind, guid.encode(), b"", ct.byref(self._callbacks), 0, 0)
 
     def call(self, name: str, *arguments: Any) -> int:
@@ -92,40 +95,48 @@ class Instance:
         self.do("fmi2EnterContinuousTimeMode")
         return info
 
+    def references(self, names: Collection[str]) -> Any:
+        """Value references of variables by name."""
+        return (ct.c_uint * len(names))(*(self.fmu.numbers[name] for name in names))
+
     def set(self, values: dict[str, float]) -> None:
         """Set variables by name."""
-        numbers = (ct.c_uint * len(values))(*(self.fmu.numbers[name] for name in values))
-        self.do("fmi2SetReal", numbers, ct.c_size_t(len(values)), (ct.c_double * len(values))(*values.values()))
+        self.do(
+            "fmi2SetReal",
+            self.references(values),
+            ct.c_size_t(len(values)),
+            (ct.c_double * len(values))(*values.values()),
+        )
 
     def get(self, *names: str) -> Any:
         """Values of variables by name, (n,)."""
-        numbers, values = (ct.c_uint * len(names))(*(self.fmu.numbers[name] for name in names)), np.empty(len(names))
-        self.do("fmi2GetReal", numbers, ct.c_size_t(len(names)), _pointer(values))
+        values = np.empty(len(names))
+        self.do("fmi2GetReal", self.references(names), ct.c_size_t(len(names)), pointer(values))
         return values
 
     def rates(self, t: float, y: Any) -> Any:
         """dy/dt (n,) of the state y (n,) at time t."""
         y, dy = np.ascontiguousarray(y, float), np.empty(len(y))
         self.do("fmi2SetTime", ct.c_double(t))
-        self.do("fmi2SetContinuousStates", _pointer(y), ct.c_size_t(len(y)))
-        self.do("fmi2GetDerivatives", _pointer(dy), ct.c_size_t(len(y)))
+        self.do("fmi2SetContinuousStates", pointer(y), ct.c_size_t(len(y)))
+        self.do("fmi2GetDerivatives", pointer(dy), ct.c_size_t(len(y)))
         return dy
 
     def along(self, unknowns: list[str], direction: dict[str, float]) -> Any:
         """Changes (n,) of variables by name in a direction, in which others change so much."""
-        of, by = ((ct.c_uint * len(names))(*(self.fmu.numbers[name] for name in names))
-                  for names in (unknowns, direction))  # fmt: skip
+        of, by = self.references(unknowns), self.references(direction)
         change, known = np.empty(len(unknowns)), np.array(list(direction.values()), float)
         counts = ct.c_size_t(len(unknowns)), ct.c_size_t(len(direction))
-        self.do("fmi2GetDirectionalDerivative", of, counts[0], by, counts[1], _pointer(known), _pointer(change))
+        self.do("fmi2GetDirectionalDerivative", of, counts[0], by, counts[1], pointer(known), pointer(change))
         return change
 
     def states(self, count: int) -> Any:
         """The present state (count,)."""
         y = np.empty(count)
-        self.do("fmi2GetReal", (ct.c_uint * count)(*range(count)), ct.c_size_t(count), _pointer(y))
+        self.do("fmi2GetReal", (ct.c_uint * count)(*range(count)), ct.c_size_t(count), pointer(y))
         return y
 
 
-def _pointer(values: Any) -> Any:
+def pointer(values: Any) -> Any:
+    """Numbers for C."""
     return values.ctypes.data_as(ct.POINTER(ct.c_double))

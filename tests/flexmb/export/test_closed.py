@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes as ct
 import os
 import platform
-import shutil
 import subprocess
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -22,20 +21,14 @@ from flexmb.export.model import ExportedModel, model, tabled
 from flexmb.export.refusals import NotExportable
 from tests.flexmb.closure import mechanisms
 from tests.flexmb.export.differentiated import errors
+from tests.flexmb.export.exported_scenes import COMPILER, mechanism
 from tests.flexmb.export.loaded import SIMULATION, EventInfo, Fmu
 
-COMPILER = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
 pytestmark = [
     pytest.mark.skipif(platform.machine() != "x86_64" or os.name != "posix", reason="export is for Linux on x86-64"),
     pytest.mark.skipif(COMPILER is None, reason="no C compiler is on the path"),
 ]
 STEP, END = 1e-3, 0.2
-
-
-def mechanism() -> fm.Scene:
-    """A four-bar whose last pin suppresses only what is not redundant."""
-    scene = mechanisms.four_bar_builder({"angle": 1.0, "rate": mechanisms.RATE}, {}, closure="in_line")
-    return scene.scene()
 
 
 @pytest.fixture(scope="module")
@@ -44,8 +37,8 @@ def scene() -> fm.Scene:
 
 
 @pytest.fixture(scope="module")
-def exported(scene: fm.Scene) -> ExportedModel:
-    return model(scene, derivatives=True)
+def exported(mechanism_model: ExportedModel) -> ExportedModel:
+    return mechanism_model
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,6 @@ import getpass
 import math
 import os
 import platform
-import shutil
 import subprocess
 import zipfile
 from concurrent.futures import ThreadPoolExecutor
@@ -25,41 +24,16 @@ from flexmb.export.description import exponents
 from flexmb.export.model import ExportedModel, model, tabled
 from flexmb.export.numbers import affine
 from flexmb.export.refusals import NotExportable, c_compiler, refuse
-from flexmb.scene.shapes import beam_section
 from tests.flexmb.export.differentiated import errors, names_of
+from tests.flexmb.export.exported_scenes import COMPILER, PUSH, machine, some_state
 from tests.flexmb.export.loaded import EXCHANGE, SIMULATION, Fmu, Instance
 from tests.repo.project import ROOT
 
-COMPILER = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
 pytestmark = [
     pytest.mark.skipif(platform.machine() != "x86_64" or os.name != "posix", reason="export is for Linux on x86-64"),
     pytest.mark.skipif(COMPILER is None, reason="no C compiler is on the path"),
 ]
 STEP, LIMIT = 1e-3, 300_000
-PUSH = fm.Pulse(value=3.0, start_s=0.013, duration_s=0.02)
-
-
-def machine() -> fm.Scene:
-    """A free body with a wheel, a driven and a sprung arm, an elastic beam, and loads that are constant or jump."""
-    scene = fm.SceneBuilder("a 'machine', 100 % \"quoted\"?", gravity=(0.1, -0.2, -9.81))
-    scene.rigid_body("hub", mass=2.0, inertia=(0.3, 0.4, 0.5)).rigid_body("arm", mass=0.5, inertia=(0.02, 0.03, 0.04))
-    scene.rigid_body("lever", mass=0.7, inertia=(0.02, 0.05, 0.04))
-    scene.beam("rod", length=0.6, elements=6, section=SECTION, modes=3)
-    scene.free("flight", "ground", "hub", angular_velocity=(0.3, -0.4, 0.5))
-    scene.revolute(
-        "pivot", "hub", "arm", parent_position=(0.2, 0.1, 0.0), angle=0.4, rate=1.0, stiffness=3.0, damping=0.1,
-        torque=fm.Constant(value=0.2),
-    )  # fmt: skip
-    scene.revolute("crank", "hub", "lever", axis=(1, 0, 0), prescribed=fm.SpinUp(rate=2.0, duration_s=0.5))
-    scene.revolute("root", "arm", "rod", parent_position=(0.1, 0.0, 0.0), axis=(0, 1, 0), angle=-0.2)
-    scene.wheel("spin", "hub", axis=(0, 0, 1), mass=0.1, axial_inertia=0.01, transverse_inertia=0.006, speed=30.0)
-    scene.force("push", "rod", node="tip", direction=(0, 0, 1), function=PUSH)
-    scene.force("hold", "arm", direction=(0, 1, 0), function=fm.Constant(value=0.2))
-    scene.marker("end", "rod", node="tip")
-    return scene.scene()
-
-
-SECTION = beam_section(E=7e10, G=2.7e10, A=1e-4, Iy=8e-10, Iz=8e-10, rho=2700)
 
 
 @pytest.fixture(scope="module")
@@ -68,8 +42,8 @@ def scene() -> fm.Scene:
 
 
 @pytest.fixture(scope="module")
-def exported(scene: fm.Scene) -> ExportedModel:
-    return model(scene, derivatives=True)
+def exported(machine_model: ExportedModel) -> ExportedModel:
+    return machine_model
 
 
 @pytest.fixture(scope="module")
@@ -82,11 +56,6 @@ def archive(exported: ExportedModel, tmp_path_factory: Any) -> Path:
 @pytest.fixture(scope="module")
 def fmu(archive: Path, tmp_path_factory: Any) -> Fmu:
     return Fmu(archive, tmp_path_factory.mktemp("unpacked"))
-
-
-def some_state(system: fm.System, seed: int = 0) -> Any:
-    y = system.initial_state.y.copy()
-    return y + 0.05 * np.random.default_rng(seed).standard_normal(len(y)) * (np.arange(len(y)) < len(y) - 1)
 
 
 def running(fmu: Fmu, **values: float) -> Instance:
@@ -438,6 +407,7 @@ WRONG = {
     "body": (("rod", "--fmu", "a.fmu"), "without a BODY"),
     "no body": (("--out", "a.sid"), "a BODY is written by"),
     "step": (("--c", "a", "--step", "1e-3"), "--step for --fmu"),
+    "version": (("--c", "a", "--fmi", "3"), "--fmi and --step for --fmu"),
     "input": (("rod", "--out", "a.sid", "--input", "push.function"), "are for --fmu and --c"),
     "derivatives": (("rod", "--out", "a.sid", "--derivatives"), "--derivatives are for"),
 }
