@@ -106,9 +106,7 @@ class ExportedModel(NamedTuple):
         return next(output.word for output in self.outputs if output.name == name)
 
 
-def model(
-    scene: Scene, inputs: Sequence[str] = (), derivatives: bool = False, target: str = LEVEL
-) -> ExportedModel:
+def model(scene: Scene, inputs: Sequence[str] = (), derivatives: bool = False, target: str = LEVEL) -> ExportedModel:
     """The model of a scene; inputs: paths of loads, motors and actuators that are inputs instead of what they are.
 
     Constant loads, motors and actuators are inputs, too. derivatives: with those of rates and outputs. target: one of
