@@ -82,6 +82,7 @@ def manufacture(scene: Scene, seed: int, duration_s: float = 1.0, amplitude: flo
     bare = without_motors(scene)
     dense = DenseSystem(bare)
     motion = draw(bare, dense, seed, duration_s, amplitude)
+    _refuse_singular(dense, motion, duration_s)
     drives = MotionLoads(bare, motion)
     intervals = INTERVALS[0]
     while (left := drives.left(duration_s, intervals)) > EXACT and intervals < INTERVALS[1]:
@@ -257,6 +258,33 @@ def _refuse(scene: Scene) -> None:
     for name, function in _functions(scene):
         if isinstance(function, ControlSignal):
             raise CaseError(f'"{name}" is led by a controller: give it a function of time, or take it out')
+
+
+def _refuse_singular(dense: DenseSystem, motion: DrawnMotion, duration_s: float) -> None:
+    """CaseError for a motion of a tree through a position without a mass matrix, as of a gimbal at its singular angle.
+
+    Its loads exist, but accelerations do not follow from them. The root of the least eigenvalue of the mass matrix, with
+    its diagonal scaled to 1, falls to zero there in proportion to time. So the motion passes one where this root changes
+    by more from one time to the next than what is left of it.
+    """
+    if dense.scene.constraints:
+        return  # what closures leave free may have a mass where a coordinate alone has none
+    free = np.ones(dense.nu, dtype=bool)
+    free[[x.u for x in dense.tree.scalars if x.prescribed is not None]] = False
+    if not np.any(free):
+        return
+    times = np.linspace(0.0, duration_s, INTERVALS[0] + 1)
+    roots = np.empty(len(times))
+    for i, t in enumerate(times.tolist()):
+        M = dense.mass_matrix(motion.at(t).q)[np.ix_(free, free)]
+        scale = 1.0 / np.sqrt(np.maximum(np.diag(M), 1e-300))
+        roots[i] = np.sqrt(max(float(np.linalg.eigvalsh(M * scale * scale[:, None])[0]), 0.0))
+    nearest = int(np.argmin(roots))
+    if roots[nearest] < np.max(np.abs(np.diff(roots[max(nearest - 1, 0) : nearest + 2]))):
+        raise CaseError(
+            f"near t = {times[nearest]:.3g} s this motion passes a position in which a freedom has no mass, as a gimbal "
+            "at its singular angle: take a smaller --amplitude, or another --seed"
+        )
 
 
 def _functions(scene: Scene) -> list[tuple[str, Function]]:

