@@ -263,9 +263,9 @@ def _refuse(scene: Scene) -> None:
 def _refuse_singular(dense: DenseSystem, motion: DrawnMotion, duration_s: float) -> None:
     """CaseError for a motion of a tree through a position without a mass matrix, as of a gimbal at its singular angle.
 
-    Its loads exist, but accelerations do not follow from them. The root of the least eigenvalue of the mass matrix, with
-    its diagonal scaled to 1, falls to zero there in proportion to time. So the motion passes one where this root changes
-    by more from one time to the next than what is left of it.
+    Its loads exist, but accelerations do not follow from them. The root of the least eigenvalue of the mass matrix,
+    with its diagonal scaled to 1, falls to zero there in proportion to time. So the motion passes one where this root
+    changes by more from one time to the next than what is left of it.
     """
     if dense.scene.constraints:
         return  # what closures leave free may have a mass where a coordinate alone has none
@@ -282,8 +282,8 @@ def _refuse_singular(dense: DenseSystem, motion: DrawnMotion, duration_s: float)
     nearest = int(np.argmin(roots))
     if roots[nearest] < np.max(np.abs(np.diff(roots[max(nearest - 1, 0) : nearest + 2]))):
         raise CaseError(
-            f"near t = {times[nearest]:.3g} s this motion passes a position in which a freedom has no mass, as a gimbal "
-            "at its singular angle: take a smaller --amplitude, or another --seed"
+            f"near t = {times[nearest]:.3g} s this motion passes a position in which a freedom has no mass, as a "
+            "gimbal at its singular angle: take a smaller --amplitude, or another --seed"
         )
 
 
