@@ -1,12 +1,24 @@
 // A case's page: charts and animation are made when they come into view; the target of a link is opened.
 "use strict";
 const pending = new Map();
-const seen = new IntersectionObserver(entries => entries.forEach(entry => {
-  if (!entry.isIntersecting || !pending.has(entry.target)) return;
-  const make = pending.get(entry.target);
-  pending.delete(entry.target); seen.unobserve(entry.target);
-  make().catch(error => { entry.target.textContent = "Nothing can be drawn here: " + error.message; console.error(error); });
-}), { rootMargin: "300px" });
+const seen = new IntersectionObserver(entries => entries.forEach(entry => { if (entry.isIntersecting) made(entry.target); }), { rootMargin: "300px" });
+
+async function made(node) {
+  if (!pending.has(node)) return;
+  const make = pending.get(node);
+  pending.delete(node); seen.unobserve(node);
+  try { await make(); } catch (error) { node.textContent = "Nothing can be drawn here: " + error.message; console.error(error); }
+}
+
+// A page is printed with what is drawn by then, and a browser does not wait for more: charts that are out of view are
+// drawn one after the other once all else has been. The single file, of many cases, has those that came into view.
+const idle = call => (globalThis.requestIdleCallback ? requestIdleCallback(call, { timeout: 200 }) : setTimeout(call, 50)); // an animation leaves little idle time
+async function rest() {
+  const next = [...pending.keys()].find(node => node.classList.contains("plot") && node.clientWidth);
+  if (!next) return;
+  await made(next);
+  idle(rest);
+}
 
 function later(node, make) { pending.set(node, make); seen.observe(node); }
 
@@ -95,3 +107,4 @@ document.addEventListener("DOMContentLoaded", () => {
   addEventListener("hashchange", reveal);
   reveal();
 });
+addEventListener("load", () => { if (document.querySelectorAll("section.case").length === 1) idle(rest); });

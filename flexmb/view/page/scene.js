@@ -22,6 +22,16 @@ function render(scene, camera, canvas) {
   paper.drawImage(stage.domElement, 0, 0);
 }
 
+// The animation to begin with: the first in which something bends, but none of a wrong model that runs away from the others.
+const RUNAWAY = 2; // travel over that of the calmest quarter
+function firstShown(animations, series) {
+  const bends = a => a.lines.some(line => ["beam", "sheet"].includes(line.kind)), some = animations.some(bends) ? animations.filter(bends) : animations;
+  const extent = column => column.reduce((most, v) => Math.max(most, v), -Infinity) - column.reduce((least, v) => Math.min(least, v), Infinity);
+  const travel = new Map(some.map(a => [a, Math.max(0, ...a.markers.map(m => Math.hypot(...series[m.position].map(extent))))]));
+  const moving = [...travel.values()].filter(v => v > 0).sort((a, b) => a - b), usual = moving[Math.floor((moving.length - 1) / 4)] ?? 0;
+  return animations.indexOf(some.find(a => travel.get(a) > 0 && travel.get(a) <= RUNAWAY * usual) || some[0]);
+}
+
 class SceneView {
   constructor(host, animations, series, title) {
     this.series = series; this.animations = animations; this.phase = 0; this.playing = false;
@@ -29,7 +39,7 @@ class SceneView {
       '<input type="range" min="0" max="1" step="0.001" value="0" aria-label="time"><span class="clock"></span></div>' +
       '<div class="controls"></div><ul class="bodies" aria-label="bodies"></ul>' +
       '<p class="hint notes"></p><p class="hint">Select the picture to turn it (drag, or shift and arrows) and to zoom (wheel, or + and -); space plays, arrows step.</p>';
-    const first = Math.max(0, animations.findIndex(a => a.lines.some(line => line.kind === "beam"))); // something that bends
+    const first = firstShown(animations, series);
     this.canvas = host.querySelector("canvas"); this.title = title; this.names = host.querySelector(".bodies"); this.notes = host.querySelector(".notes");
     this.slider = host.querySelector("input"); this.clock = host.querySelector(".clock"); this.button = host.querySelector("button");
     this.button.onclick = () => this.toggle();

@@ -177,6 +177,14 @@ def test_charts_are_drawn(reader: Reader, page: Path, size) -> None:
     assert reader.errors() == []
 
 
+def test_all_charts_are_drawn_without_being_looked_at_so_that_they_are_printed(reader: Reader, page: Path) -> None:
+    reader.open(page)
+    reader.wait("return document.querySelectorAll('.plot').length > 2")
+    reader.wait("return [...document.querySelectorAll('.plot')].every(p => !p.clientWidth || p.matches('.drawn'))")
+    assert reader.run("return scrollY") == 0
+    assert reader.errors() == []
+
+
 @pytest.mark.parametrize("size", [WIDE, NARROW])
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
 def test_the_index_shows_speed_against_accuracy_and_leads_to_the_case(
@@ -381,3 +389,34 @@ def test_a_view_of_a_run_moves_and_shows_its_loads(reader: Reader, tmp_path: Pat
     assert np.array_equal(reader.picture(".animation canvas"), without)
     assert reader.run("return performance.getEntriesByType('resource').length") == 0
     assert reader.errors() == []
+
+
+@pytest.mark.parametrize("size", [WIDE, NARROW])
+def test_the_charts_of_a_run_are_drawn(reader: Reader, tmp_path: Path, size: tuple[int, int]) -> None:
+    """The page of `Trajectory.plot`, which loads nothing."""
+    file = tmp_path / "charts.html"
+    fm.simulate(fm.load_scene(shipped_folder() / "pendulums" / "double" / "scene.toml"), 1.0).plot(file)
+    reader.open(file, size)
+    reader.wait("return document.querySelectorAll('.js-plotly-plot').length === 4")
+    for number in range(4):
+        reader.run("document.querySelectorAll('.js-plotly-plot')[arguments[0]].id = 'shown' + arguments[0]", number)
+        assert len(hues(reader.picture(f"#shown{number}"))) >= 2
+    assert HIGHEST[size] > reader.run("return document.documentElement.scrollHeight")
+    assert reader.run("return document.documentElement.scrollWidth") <= size[0]
+    assert reader.run("return performance.getEntriesByType('resource').length") == 0
+    assert reader.errors() == []
+
+
+def test_a_model_that_runs_away_is_not_shown_first(reader: Reader, tmp_path: Path) -> None:
+    """The first bending variant is, unless it travels far beyond the calmer ones; a rigid one is passed over."""
+    file = tmp_path / "view.html"
+    fm.simulate(fm.load_scene(shipped_folder() / "pendulums" / "double" / "scene.toml"), 0.1).view(file)
+    reader.open(file)
+    script = """
+        const series = arguments[0].map(([, far]) => [[0, far], [0, 0], [0, 0]]);
+        return firstShown(arguments[0].map(([kind], i) => ({ lines: [{ kind }], markers: [{ position: i }] })), series);
+    """
+    alike = [["solid", 1.0], ["beam", 1.3], ["beam", 1.2], ["beam", 1.0]]
+    assert reader.run(script, alike) == 1
+    assert reader.run(script, [alike[0], ["beam", 90.0], *alike[2:]]) == 2
+    assert reader.run(script, [["solid", 1.0], ["solid", 1.1]]) == 0
