@@ -52,3 +52,6 @@ figure.savefig("02_flexible_arm.svg")
 
 # What is left comes from the second mode, and from the little that the torque bends the arm out of its linear range.
 assert shaking[2.0] < 0.01 * shaking[2.5]
+
+left = {periods: 1e3 * size for periods, size in shaking.items()}
+print(f"shaking afterwards {left[2.0]:.3f} mm, else {left[2.5]:.1f} mm; wrote 02_flexible_arm.svg")

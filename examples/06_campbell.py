@@ -38,3 +38,5 @@ figure.savefig("06_campbell.svg")
 
 found = frequencies[np.searchsorted(rates, list(published)), 1]
 assert np.allclose(found, list(published.values()), rtol=1e-4)
+
+print(f"out of the plane {found[0]:.4f} rad/s at rest, {found[-1]:.4f} at 10 rad/s; wrote 06_campbell.svg")

@@ -48,3 +48,5 @@ figure.savefig("08_fit.svg")
 # Both values are within three standard errors of the truth, and the sum of squares is that of the noise (chi-squared).
 assert np.all(np.abs(fit.x - truth) < 3.0 * error)
 assert abs(2.0 * fit.cost - len(times)) < 3.0 * np.sqrt(2.0 * len(times))
+
+print("wrote 08_fit.svg")

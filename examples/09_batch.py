@@ -46,3 +46,5 @@ assert np.all(np.isnan(first[depth > 2.0]))
 
 # Starts that are mirror images move as mirror images, to the last bit, although the motion is chaotic.
 assert np.array_equal(first, first[::-1], equal_nan=True)
+
+print(f"{np.isfinite(first).sum()} of {count**2} pendulums turn over within 10 s; wrote 09_batch.svg")

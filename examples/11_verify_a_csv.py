@@ -62,3 +62,5 @@ axes.legend(loc="lower right", fontsize=8)
 figure.savefig("11_verify_a_csv.svg")
 
 assert right.ok and not wrong.ok and "not in World axes" in cause
+
+print(f"corrected, it is {max(verdict.E for verdict in right.all):.1e} away; wrote mine.csv and 11_verify_a_csv.svg")

@@ -56,3 +56,5 @@ figure.savefig("12_speed_against_accuracy.svg")
 halved = errors["rk4"][-2] / errors["rk4"][-1]
 assert 12.0 < halved < 20.0
 assert all(found[-1] < 0.1 * found[0] for found in errors.values())
+
+print(f"half the step of rk4: an error {halved:.1f} times smaller; wrote 12_speed_against_accuracy.svg")

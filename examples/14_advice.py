@@ -51,3 +51,5 @@ found, known = (
 )
 assert np.linalg.norm(found - known, axis=1).max() < tolerance * np.ptp(known, axis=0).max()
 assert advice.operations < max(trial.operations for trial in advice.trials)
+
+print("wrote 14_advice.svg")

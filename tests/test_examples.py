@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -12,9 +13,16 @@ LARGEST = 100_000  # bytes of a picture
 
 
 @pytest.mark.parametrize("example", examples(), ids=lambda example: example.file.stem)
-def test_an_example_runs_and_draws(example: Example, tmp_path: Path) -> None:
+def test_an_example_runs_draws_and_says_what_it_found(
+    example: Example, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A number, and at the end the files that it has written."""
     example.run(tmp_path)
+    said = capsys.readouterr().out
     assert (tmp_path / example.picture).stat().st_size > 1000
+    last = said.splitlines()[-1].rpartition("wrote ")[2]
+    assert set(last.replace(" and ", " ").split()) == {file.name for file in tmp_path.iterdir()}
+    assert re.search(r"\d", said.replace(last, ""))
 
 
 @pytest.mark.parametrize("example", examples(), ids=lambda example: example.file.stem)

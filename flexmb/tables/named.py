@@ -27,7 +27,7 @@ def brief(result: Any) -> str:
 def _shown(value: Any) -> str:
     if isinstance(value, np.ndarray):
         if value.size <= SHOWN:
-            return str(value.tolist())
+            return str(_rounded(value.tolist()))
         return f"<{value.dtype.name} {' x '.join(map(str, value.shape))}>"
     if isinstance(value, str):
         return repr(value) if len(value) <= LETTERS else f"{value[: LETTERS - 3]!r}..."
@@ -40,6 +40,13 @@ def _shown(value: Any) -> str:
         return f"<{len(value)} of {type(value[0]).__name__}>"
     text = repr(value)
     return text if len(text) <= 2 * LETTERS and "\n" not in text else f"<{type(value).__name__}>"
+
+
+def _rounded(numbers: Any) -> Any:
+    """Numbers of nested lists with six digits, which a reader takes in."""
+    if isinstance(numbers, list):
+        return [_rounded(number) for number in numbers]
+    return type(numbers)(f"{numbers:.6g}") if isinstance(numbers, float | complex) else numbers
 
 
 Value = TypeVar("Value")

@@ -29,7 +29,7 @@ ACROSS = 3  # pictures in a row
 INTRODUCTION = """# Examples
 
 Short scripts with one idea each, in `examples/`: run one, change it, run it again. Each writes its picture into the
-folder in which it is run, and ends with a check of what it says. This page is generated:
+folder in which it is run, checks what it says, and prints what it found and wrote. This page is generated:
 `python -m tests.repo.examples`.
 
 <!-- not run: it would write a picture into the repository -->

@@ -73,3 +73,15 @@ def test_small_things_are_shown_whole_and_large_ones_by_their_size() -> None:
     assert repr(Some(np.zeros((3, 4), np.int64), {"k": 1.0}, ("x",) * 9, "y" * 80)) == (
         f"Some(row=<int64 3 x 4>, table=<1 by name>, names=<9 of str>, text='{'y' * 57}'...)"
     )
+
+
+def test_numbers_have_six_digits_and_whole_ones_all() -> None:
+    @dataclasses.dataclass
+    class Some:
+        row: np.ndarray
+
+        __repr__ = brief
+
+    assert repr(Some(np.array([1.0 / 3.0, 1e-20 / 3.0]))) == "Some(row=[0.333333, 3.33333e-21])"
+    assert repr(Some(np.array([1j / 3.0, np.nan]))) == "Some(row=[0.333333j, (nan+0j)])"
+    assert repr(Some(np.array([12345678]))) == "Some(row=[12345678])"
