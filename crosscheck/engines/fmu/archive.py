@@ -7,12 +7,12 @@ import re
 import xml.etree.ElementTree as ET
 import zipfile
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path, PurePosixPath
 from typing import Any, Literal, NamedTuple
 
 from crosscheck.engines.fmu.bad import BadFmu
 from crosscheck.engines.fmu.units import Unit
+from flexmb.kept import kept
 from flexmb.scene.problems import closest
 
 Interface = Literal["model exchange", "co-simulation"]
@@ -21,7 +21,7 @@ REALS = ("Real", "Float64")
 ELEMENT = re.compile(r"(.+)\[(\d+(?:,\d+)*)\]")
 
 
-class Variable(NamedTuple):
+class FmuVariable(NamedTuple):
     """A real number of a model: an element, counted from 0, of a variable that has `size` of them.
 
     start: as the description gives it, None where there is none; unit: as declared, None where none is.
@@ -51,7 +51,7 @@ class Variable(NamedTuple):
         return ""
 
 
-class Own(NamedTuple):
+class OwnDigests(NamedTuple):
     """What an FMU that flexmb has exported says of its scene: digests of the scene, and of it without start values."""
 
     scene: str
@@ -59,7 +59,7 @@ class Own(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Archive:
+class FmuArchive:
     """An FMU that this machine can run. `digest` is that of the file; `own`, if flexmb has exported it, its digests.
 
     `description` is FMPy's.
@@ -71,9 +71,9 @@ class Archive:
     name: str
     interfaces: dict[Interface, str]
     description: Any
-    own: Own | None
+    own: OwnDigests | None
 
-    def variable(self, name: str) -> Variable:
+    def variable(self, name: str) -> FmuVariable:
         """The real number called so; an element of an array as "x[2]" or "R[1,3]", from 1. BadFmu if there is none."""
         found = self._by_name.get(name)
         if found is not None:
@@ -106,16 +106,16 @@ class Archive:
         """Names of the inputs, an array by its whole name."""
         return tuple(name for name, each in self._by_name.items() if each.causality == "input")
 
-    @cached_property
+    @kept
     def _by_name(self) -> dict[str, Any]:
         return {each.name: each for each in self.description.modelVariables}
 
-    def _number(self, found: Any, name: str, element: int) -> Variable:
+    def _number(self, found: Any, name: str, element: int) -> FmuVariable:
         if found.type not in REALS:
             raise BadFmu(f'{self.path}: variable "{name}" is of type {found.type}: only {" and ".join(REALS)} are read')
         starts = str(found.start).split() if found.start is not None else []
         start = float(starts[min(element, len(starts) - 1)]) if starts else None
-        return Variable(
+        return FmuVariable(
             name, found.valueReference, _size(found), element, found.causality or "local",
             found.variability or "continuous", found.initial or "", start, self._unit(found),
         )  # fmt: skip
@@ -140,7 +140,7 @@ def _size(variable: Any) -> int:
     return size
 
 
-def read_archive(path: Path) -> Archive:
+def read_archive(path: Path) -> FmuArchive:
     """The FMU in a file, whose code is not loaded. BadFmu for a file that is none, or that cannot run here."""
     if not path.is_file():
         raise BadFmu(f"{path}: there is no such file" if not path.exists() else f"{path} is a folder, and no FMU")
@@ -167,7 +167,7 @@ def read_archive(path: Path) -> Archive:
     described = _described(path)
     interfaces = _interfaces(path, described)
     _check_platform(path, version, names, set(interfaces.values()))
-    return Archive(
+    return FmuArchive(
         path, hashlib.sha256(content).hexdigest()[:16], version, described.modelName or path.stem, interfaces,
         described, _own(root),
     )  # fmt: skip
@@ -224,10 +224,10 @@ def _check_platform(path: Path, version: str, names: list[str], identifiers: set
             raise BadFmu(f"{path} cannot run on this platform, {folder}: {has}: export it for {folder}")
 
 
-def _own(root: ET.Element) -> Own | None:
+def _own(root: ET.Element) -> OwnDigests | None:
     if not root.get("generationTool", "").startswith("flexmb "):
         return None
     for each in root.iter():
         if each.tag.rpartition("}")[2] == "digests" and each.get("scene"):
-            return Own(each.get("scene", ""), each.get("model", ""))
+            return OwnDigests(each.get("scene", ""), each.get("model", ""))
     return None

@@ -19,7 +19,7 @@ Kind = Literal[
 XYZ = "xyz"
 
 
-class Group(NamedTuple):
+class ColumnGroup(NamedTuple):
     """Columns that belong together: (name, unit) of each, in the order of the array of the contract that they become.
 
     A model gives all of them or none. `instead`: the nine columns of a marker's rotation matrix, row by row, which may
@@ -40,18 +40,18 @@ class StateColumn(NamedTuple):
     prescribed: bool = False
 
 
-def groups(scene: Scene) -> Iterator[Group]:
+def groups(scene: Scene) -> Iterator[ColumnGroup]:
     """All that a model of the scene may give but coordinates and speeds."""
     for marker in scene.markers:
         name = marker.name
-        yield Group(
+        yield ColumnGroup(
             "marker", name,
             (*_vector(f"{name}.position", "m"), *((f"{name}.quaternion.{axis}", "1") for axis in "wxyz"),
              *_vector(f"{name}.angular_velocity", "rad/s"), *_vector(f"{name}.velocity", "m/s")),
             tuple((f"{name}.rotation[{i},{j}]", "1") for i in (1, 2, 3) for j in (1, 2, 3)),
         )  # fmt: skip
         both = _vector(f"{name}.angular_acceleration", "rad/s^2"), _vector(f"{name}.acceleration", "m/s^2")
-        yield Group("acceleration", name, (*both[0], *both[1]))
+        yield ColumnGroup("acceleration", name, (*both[0], *both[1]))
     loaded: tuple[tuple[Kind, list[str]], ...] = (
         ("load", [each.name for each in (*scene.hinges, *scene.closures, *scene.couplings, *scene.point_masses)]),
         ("total_load", [each.name for each in scene.total_loads]),
@@ -60,16 +60,16 @@ def groups(scene: Scene) -> Iterator[Group]:
     )
     for kind, names in loaded:
         for name in names:
-            yield Group(kind, name, (*_vector(f"{name}.torque", "N m"), *_vector(f"{name}.force", "N")))
+            yield ColumnGroup(kind, name, (*_vector(f"{name}.torque", "N m"), *_vector(f"{name}.force", "N")))
     for name, units in _driven(scene):
-        yield Group("drive", name, tuple((f"{name}.drive[{i}]", unit) for i, unit in enumerate(units)))
+        yield ColumnGroup("drive", name, tuple((f"{name}.drive[{i}]", unit) for i, unit in enumerate(units)))
     for connector in scene.connectors:
         if isinstance(connector, AlongHinge):
             unit = "N m" if connector.ANGULAR else "N"
-            yield Group("hinge_force", connector.name, ((f"{connector.name}.hinge_force", unit),))
-    yield Group("energy", "", tuple((f"energy.{kind}", "J") for kind in ENERGIES))  # their sum is a channel, too
-    yield Group("momentum", "", (*_vector("momentum.angular", "N m s"), *_vector("momentum.linear", "N s")))
-    yield Group("work", "", (("work", "J"),))
+            yield ColumnGroup("hinge_force", connector.name, ((f"{connector.name}.hinge_force", unit),))
+    yield ColumnGroup("energy", "", tuple((f"energy.{kind}", "J") for kind in ENERGIES))  # their sum is a channel, too
+    yield ColumnGroup("momentum", "", (*_vector("momentum.angular", "N m s"), *_vector("momentum.linear", "N s")))
+    yield ColumnGroup("work", "", (("work", "J"),))
 
 
 def states(scene: Scene) -> dict[str, StateColumn]:

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import hashlib
-from functools import cached_property
 from pathlib import Path
 from typing import assert_never
 
 from crosscheck.engines.contract import USUAL_S, Effort, Model, Support
-from crosscheck.engines.fmu.archive import Archive, read_archive
+from crosscheck.engines.fmu.archive import FmuArchive, read_archive
 from crosscheck.engines.fmu.bad import BadFmu
-from crosscheck.engines.fmu.layout import Layout, of_mapping, of_own
+from crosscheck.engines.fmu.layout import MappedColumns, of_mapping, of_own
 from crosscheck.engines.fmu.mapping import MappingFile, read_mapping
-from crosscheck.engines.fmu.model import FmuModel, Way
+from crosscheck.engines.fmu.model import FmuInterface, FmuModel
 from crosscheck.engines.fmu.scenes import foreign_obstacle, is_own_scene, own_obstacle
 from crosscheck.engines.pace import pace
 from crosscheck.engines.peer import needed
 from crosscheck.engines.steps import ladder
+from flexmb.kept import kept
 from flexmb.scene.files import load_scene
 from flexmb.scene.problems import SceneError
 from flexmb.scene.schema import Scene, SidBody
@@ -96,7 +96,7 @@ class FmuEngine:
             raise ValueError(f'scene "{scene.name}": {reason}')
         return FmuModel(self._archive, self._layout(scene), self._way, scene)
 
-    @cached_property
+    @kept
     def _files(self) -> tuple[Path, Path | None]:
         """The FMU, and its mapping, if there is one."""
         if self._given.suffix.lower() == ".toml":
@@ -107,17 +107,17 @@ class FmuEngine:
         beside = self._given.with_suffix(".toml")
         return self._given, beside if beside.is_file() else None
 
-    @cached_property
-    def _archive(self) -> Archive:
+    @kept
+    def _archive(self) -> FmuArchive:
         return read_archive(self._files[0])
 
-    @cached_property
+    @kept
     def _mapping_file(self) -> Path | None:
         """The file that counts: beside an FMU that flexmb has exported its scene may have the name of a mapping."""
         is_named = self._files[1] == self._given
         return None if self._archive.own is not None and not is_named else self._files[1]
 
-    @cached_property
+    @kept
     def _mapping(self) -> MappingFile:
         file = self._mapping_file
         return MappingFile() if file is None else read_mapping(file)
@@ -127,12 +127,12 @@ class FmuEngine:
         file = self._mapping_file
         return "" if file is None else f" by {hashlib.sha256(file.read_bytes()).hexdigest()[:16]}"
 
-    @cached_property
+    @kept
     def _is_own(self) -> bool:
         """Whether names and units follow from the FMU: flexmb has exported it, and the mapping has no channels."""
         return self._archive.own is not None and not self._mapping.channels
 
-    @cached_property
+    @kept
     def _modelled(self) -> Scene:
         """The scene that a foreign FMU models."""
         file, named = self._mapping_file, self._mapping.scene
@@ -144,8 +144,8 @@ class FmuEngine:
         except (SceneError, OSError) as error:
             raise BadFmu(f"{file}: its scene cannot be read: {error}") from None
 
-    @cached_property
-    def _way(self) -> Way:
+    @kept
+    def _way(self) -> FmuInterface:
         archive, mapping = self._archive, self._mapping
         offered = tuple(archive.interfaces)
         interface = offered[0] if mapping.interface is None else mapping.interface
@@ -156,16 +156,16 @@ class FmuEngine:
             for key, unused in (("efforts", mapping.efforts != "steps"), ("step", mapping.step is not None)):
                 if unused:
                     raise BadFmu(f'{where}: "{key}" is of co-simulation, and this is model exchange: leave it out')
-            return Way(interface)
+            return FmuInterface(interface)
         name = mapping.step or (OWN_STEP if archive.own is not None else None)
         if name is None:
-            return Way(interface)
+            return FmuInterface(interface)
         variable = archive.variable(name)
         if variable.fixed:
             raise BadFmu(f'{where}: the step "{name}" cannot be set: {variable.fixed}')
         if variable.unit is not None and (variable.unit.factor, variable.unit.exponents) != (1.0, (0, 0, 1)):
             raise BadFmu(f'{where}: the step "{name}" is in {variable.unit.name}, and s is wanted')
-        return Way(interface, variable)
+        return FmuInterface(interface, variable)
 
     def _check(self) -> None:
         """BadFmu for all that can be wrong before a scene is known."""
@@ -199,7 +199,7 @@ class FmuEngine:
             return str(error)
         return ""
 
-    def _layout(self, scene: Scene) -> Layout:
+    def _layout(self, scene: Scene) -> MappedColumns:
         if self._is_own:
             layout = of_own(self._archive, scene)
             return layout._replace(settings=()) if is_own_scene(self._archive, scene) else layout

@@ -78,7 +78,7 @@ def _integrator(instance: Instance, t: float, end: float, tolerance: float) -> A
     interpolated.argtypes, interpolated.restype = [ct.c_void_p, ct.c_double, ct.c_int, ct.c_void_p], ct.c_int
     fmu, described = instance.fmu, instance.archive.description
 
-    class Integrator(CVodeSolver):
+    class CvodeOfFmu(CVodeSolver):
         """FMPy's, of which an error of the FMU in a callback ends the run, where FMPy's goes on with what is there."""
 
         def __init__(self) -> None:
@@ -143,7 +143,7 @@ def _integrator(instance: Instance, t: float, end: float, tolerance: float) -> A
             if not self.discrete:
                 self.set_x(self.px, self.nx)
 
-    return Integrator()
+    return CvodeOfFmu()
 
 
 class _NoInput:

@@ -8,7 +8,7 @@ from math import inf
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from crosscheck.engines.fmu.archive import Archive, Interface, Variable
+from crosscheck.engines.fmu.archive import FmuArchive, FmuVariable, Interface
 
 MOST_ITERATIONS = 1000  # of discrete states at one event
 MOST_MESSAGES = 20
@@ -29,7 +29,7 @@ class Events(NamedTuple):
 class Instance:
     """An instance in a folder into which its archive is unpacked; `close` it."""
 
-    def __init__(self, archive: Archive, folder: Path, interface: Interface) -> None:
+    def __init__(self, archive: FmuArchive, folder: Path, interface: Interface) -> None:
         from fmpy import instantiate_fmu
 
         self.archive, self._messages = archive, list[str]()
@@ -47,7 +47,7 @@ class Instance:
             self.fmu.terminate()
         self.fmu.freeInstance()
 
-    def start(self, t: float, tolerance: float | None, values: Iterable[tuple[Variable, float]]) -> None:
+    def start(self, t: float, tolerance: float | None, values: Iterable[tuple[FmuVariable, float]]) -> None:
         """Initialise at a time (s), for a relative tolerance, with values of variables in their own units."""
         try:
             if self.is_second:
@@ -61,7 +61,7 @@ class Instance:
         except Exception as error:
             raise self.failed(f"it cannot begin at t = {t:g} s", error) from None
 
-    def get(self, variables: Sequence[Variable]) -> list[float]:
+    def get(self, variables: Sequence[FmuVariable]) -> list[float]:
         """Values of variables in their own units."""
         whole = dict.fromkeys((each.reference, each.size) for each in variables)
         read = self.fmu.getReal if self.is_second else self.fmu.getFloat64
@@ -96,9 +96,9 @@ class Instance:
         """The error of a call, with what the FMU logged last."""
         return Failed(f"{what}: {error}{self._told()}")
 
-    def _set(self, values: Iterable[tuple[Variable, float]]) -> None:
+    def _set(self, values: Iterable[tuple[FmuVariable, float]]) -> None:
         """Set numbers; those of an array together with its other start values."""
-        whole: dict[int, tuple[Variable, list[float]]] = {}
+        whole: dict[int, tuple[FmuVariable, list[float]]] = {}
         for variable, value in values:
             if variable.reference not in whole:
                 kept = self.get([variable._replace(element=i) for i in range(variable.size)]) if (

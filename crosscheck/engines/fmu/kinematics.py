@@ -21,7 +21,7 @@ from flexmb.typing import Real
 XYZ, WXYZ = "xyz", "wxyz"
 
 
-class Moving(NamedTuple):
+class FrameInMotion(NamedTuple):
     """A frame in World axes: position (3,), rotation (3,3), angular and linear velocity (3,) of its origin."""
 
     position: Real
@@ -29,18 +29,18 @@ class Moving(NamedTuple):
     angular: Real
     linear: Real
 
-    def carrying(self, inner: Frame) -> Moving:
+    def carrying(self, inner: Frame) -> FrameInMotion:
         """A frame fixed in this one."""
         arm = self.rotation @ inner.position
-        return Moving(
+        return FrameInMotion(
             self.position + arm, self.rotation @ inner.rotation, self.angular, self.linear + cross(self.angular, arm)
         )
 
-    def turned(self, rotation: Real, angular: Real) -> Moving:
+    def turned(self, rotation: Real, angular: Real) -> FrameInMotion:
         """After a turn, with its rate in the axes of this frame."""
         return self._replace(rotation=self.rotation @ rotation, angular=self.angular + self.rotation @ angular)
 
-    def shifted(self, by: Real, rate: Real) -> Moving:
+    def shifted(self, by: Real, rate: Real) -> FrameInMotion:
         """After a shift, with its rate, both in the axes of this frame."""
         arm = self.rotation @ by
         return self._replace(
@@ -62,7 +62,7 @@ class Kinematics:
     def paths(self, times: Real, columns: dict[str, Real]) -> dict[str, MarkerPath]:
         """Motions of all markers by name; columns (T,): coordinates and speeds by their names in states, without those
         that a function of time prescribes."""
-        seen: dict[str, list[Moving]] = {name: [] for name in self._places}
+        seen: dict[str, list[FrameInMotion]] = {name: [] for name in self._places}
         for row, t in enumerate(times):
             values = {name: float(column[row]) for name, column in columns.items()}
             frames = self._frames(float(t), values)
@@ -77,8 +77,8 @@ class Kinematics:
             for name, motion in seen.items()
         }
 
-    def _frames(self, t: float, values: dict[str, float]) -> list[Moving]:
-        frames: list[Moving] = []
+    def _frames(self, t: float, values: dict[str, float]) -> list[FrameInMotion]:
+        frames: list[FrameInMotion] = []
         for link in self._links:
             at = STILL if link.parent < 0 else frames[link.parent]
             at = at.carrying(link.inboard)
@@ -90,8 +90,8 @@ class Kinematics:
         return frames
 
     def _through(
-        self, at: Moving, link: Link, freedom: Freedom, number: int, t: float, values: dict[str, float]
-    ) -> Moving:
+        self, at: FrameInMotion, link: Link, freedom: Freedom, number: int, t: float, values: dict[str, float]
+    ) -> FrameInMotion:
         match freedom:
             case Scalar():
                 value, rate = self._scalar(link, freedom, number, t, values)
@@ -130,7 +130,7 @@ class Kinematics:
         return values[name], values[f"{name}.rate"]
 
 
-STILL = Moving(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
+STILL = FrameInMotion(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
 
 
 def _attitude(joint: str, values: dict[str, float]) -> tuple[Real, Real]:

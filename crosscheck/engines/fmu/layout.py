@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
-from crosscheck.engines.fmu.archive import Archive, Variable
+from crosscheck.engines.fmu.archive import FmuArchive, FmuVariable
 from crosscheck.engines.fmu.bad import BadFmu
-from crosscheck.engines.fmu.columns import Group, StateColumn, groups, states
+from crosscheck.engines.fmu.columns import ColumnGroup, StateColumn, groups, states
 from crosscheck.engines.fmu.mapping import MappingFile, Read, Set
 from crosscheck.engines.fmu.units import Unit, unit
 from flexmb.scene.keys import split_unit
@@ -19,7 +19,7 @@ from flexmb.scene.values import PathError, values_at
 class Source(NamedTuple):
     """Where a column comes from: factor * (a variable) + offset in SI, or the offset alone if there is no variable."""
 
-    variable: Variable | None
+    variable: FmuVariable | None
     factor: float
     offset: float
 
@@ -28,7 +28,7 @@ class Setting(NamedTuple):
     """A variable that is set before a run to factor * (the number of the scene at `path`) + offset, in its own unit;
     to the offset if there is no path."""
 
-    variable: Variable
+    variable: FmuVariable
     path: str
     factor: float
     offset: float
@@ -38,17 +38,17 @@ class Setting(NamedTuple):
         return self.offset + (self.factor * _number(scene, self.path) if self.path else 0.0)
 
 
-class Layout(NamedTuple):
+class MappedColumns(NamedTuple):
     """What is read and set: `columns` by their names in the scene; `given`: the groups of which all columns are there,
     with the columns that they are made of."""
 
     columns: dict[str, Source]
     settings: tuple[Setting, ...]
-    given: tuple[tuple[Group, tuple[str, ...]], ...]
+    given: tuple[tuple[ColumnGroup, tuple[str, ...]], ...]
     coordinates: bool
 
     @property
-    def variables(self) -> tuple[Variable, ...]:
+    def variables(self) -> tuple[FmuVariable, ...]:
         """All variables that are read, each once."""
         read = (source.variable for source in self.columns.values())
         return tuple(dict.fromkeys(each for each in read if each is not None))
@@ -59,7 +59,7 @@ class Layout(NamedTuple):
         return tuple(setting.path for setting in self.settings if setting.path)
 
 
-def of_mapping(archive: Archive, mapping: MappingFile, scene: Scene, where: str) -> Layout:
+def of_mapping(archive: FmuArchive, mapping: MappingFile, scene: Scene, where: str) -> MappedColumns:
     """The layout that a mapping file `where` states for the scene. BadFmu for what does not fit, by name."""
     every, moving = list(groups(scene)), states(scene)
     si = {name: text for group in every for name, text in (*group.columns, *group.instead)}
@@ -85,10 +85,10 @@ def of_mapping(archive: Archive, mapping: MappingFile, scene: Scene, where: str)
     given = tuple(_given(every, columns, where))
     if not given and not (coordinates and scene.markers):
         raise BadFmu(f"{where} maps no channel that is compared: map coordinates, markers, loads, drives or energies")
-    return Layout(columns, settings, given, coordinates)
+    return MappedColumns(columns, settings, given, coordinates)
 
 
-def of_own(archive: Archive, scene: Scene) -> Layout:
+def of_own(archive: FmuArchive, scene: Scene) -> MappedColumns:
     """The layout of an FMU that flexmb has exported: names and units are those of the scene."""
     every, moving = list(groups(scene)), states(scene)
     there = set(archive.names)
@@ -101,10 +101,10 @@ def of_own(archive: Archive, scene: Scene) -> Layout:
         if name in there and not state.prescribed
     ]
     given = tuple(_given(every, columns, str(archive.path)))
-    return Layout(columns, (*settings, *starts), given, coordinates=False)
+    return MappedColumns(columns, (*settings, *starts), given, coordinates=False)
 
 
-def own_parameters(archive: Archive) -> dict[str, str]:
+def own_parameters(archive: FmuArchive) -> dict[str, str]:
     """The parameters of an FMU that flexmb has exported, and the paths of their numbers in the scene."""
     ending = " of the scene"
     described = ((each.name, each.description or "") for each in archive.description.modelVariables)
@@ -116,8 +116,8 @@ def own_parameters(archive: Archive) -> dict[str, str]:
 
 
 def _given(
-    every: Iterable[Group], columns: Mapping[str, Source], where: str
-) -> Iterator[tuple[Group, tuple[str, ...]]]:
+    every: Iterable[ColumnGroup], columns: Mapping[str, Source], where: str
+) -> Iterator[tuple[ColumnGroup, tuple[str, ...]]]:
     """The groups that are mapped; BadFmu for one of which columns are missing."""
     for group in every:
         names = tuple(name for name, _ in group.columns)
@@ -156,7 +156,7 @@ def _require_coordinates(
             )
 
 
-def _require_inputs(archive: Archive, known: set[str], where: str) -> None:
+def _require_inputs(archive: FmuArchive, known: set[str], where: str) -> None:
     for name in archive.inputs:
         if name not in known and not any(each.startswith(f"{name}[") for each in known):
             raise BadFmu(
@@ -165,7 +165,7 @@ def _require_inputs(archive: Archive, known: set[str], where: str) -> None:
             )
 
 
-def _source(archive: Archive, entry: float | str | Read, si: Unit, where: str) -> Source:
+def _source(archive: FmuArchive, entry: float | str | Read, si: Unit, where: str) -> Source:
     if isinstance(entry, int | float):
         return Source(None, 0.0, float(entry))
     read = Read(variable=entry) if isinstance(entry, str) else entry
@@ -174,7 +174,7 @@ def _source(archive: Archive, entry: float | str | Read, si: Unit, where: str) -
     return Source(variable, read.sign * read.scale * own.factor, read.sign * read.scale * own.offset + read.offset)
 
 
-def _setting(archive: Archive, name: str, entry: float | Set, scene: Scene, where: str) -> Setting:
+def _setting(archive: FmuArchive, name: str, entry: float | Set, scene: Scene, where: str) -> Setting:
     variable = archive.variable(name)
     if variable.fixed:
         raise BadFmu(f"{where} cannot be set: {variable.fixed}")
@@ -190,7 +190,7 @@ def _setting(archive: Archive, name: str, entry: float | Set, scene: Scene, wher
     )
 
 
-def _unit_of(variable: Variable, stated: str | None, si: Unit, where: str) -> Unit:
+def _unit_of(variable: FmuVariable, stated: str | None, si: Unit, where: str) -> Unit:
     """The unit of a variable, as declared or stated; BadFmu where both differ or it is one of another quantity."""
     declared = variable.unit
     try:

@@ -34,11 +34,11 @@ from flexmb.scene.reading import Unreadable, parse_toml
 EffortKind = Literal["steps", "tolerances"]
 
 
-class _Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class _MappingEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Base of the entries, which refuses unknown keys."""
 
 
-class Read(_Entry, frozen=True, kw_only=True):
+class Read(_MappingEntry, frozen=True, kw_only=True):
     """A column that is read from a variable: sign * scale * (the variable in SI) + offset, the offset in SI.
 
     unit: that of the variable, where the FMU declares none.
@@ -51,7 +51,7 @@ class Read(_Entry, frozen=True, kw_only=True):
     offset: float = 0.0
 
 
-class Set(_Entry, frozen=True, kw_only=True):
+class Set(_MappingEntry, frozen=True, kw_only=True):
     """A variable that is set before a run: sign * scale * (the number of the scene) + offset, the offset in SI.
 
     scene: path of the number, as for `Scene.with_values`. unit: that of the variable, where the FMU declares none.
@@ -64,7 +64,7 @@ class Set(_Entry, frozen=True, kw_only=True):
     offset: float = 0.0
 
 
-class MappingFile(_Entry, frozen=True, kw_only=True):
+class MappingFile(_MappingEntry, frozen=True, kw_only=True):
     """The whole file.
 
     scene: the file of the scene that the FMU models, relative to this file. fmu: the FMU, likewise; by default the

@@ -15,12 +15,12 @@ import numpy as np
 
 from crosscheck.engines.contract import ENERGIES, Effort, MarkerPath, MarkerSnapshot, Run, Snapshot, Trajectory
 from crosscheck.engines.conventions import quaternion_of
-from crosscheck.engines.fmu.archive import Archive, Interface, Variable
+from crosscheck.engines.fmu.archive import FmuArchive, FmuVariable, Interface
 from crosscheck.engines.fmu.columns import states
 from crosscheck.engines.fmu.exchange import exchanged
 from crosscheck.engines.fmu.instance import Instance
 from crosscheck.engines.fmu.kinematics import Kinematics
-from crosscheck.engines.fmu.layout import Layout
+from crosscheck.engines.fmu.layout import MappedColumns
 from crosscheck.engines.fmu.stepping import stepped
 from crosscheck.engines.trajectories import continuous
 from flexmb.scene.schema import Scene
@@ -30,17 +30,17 @@ NO_ROTATION = 1e-5  # of the norm of a quaternion, and of the products of the co
 USUAL_TOLERANCE = 1e-8  # of Model Exchange where nothing is integrated
 
 
-class Way(NamedTuple):
+class FmuInterface(NamedTuple):
     """How an FMU is run: its interface, and the parameter that is set to the communication step, if there is one."""
 
     interface: Interface
-    step: Variable | None = None
+    step: FmuVariable | None = None
 
 
 class FmuModel:
     """An FMU unpacked into a folder that is removed with the model; every run has an instance of its own."""
 
-    def __init__(self, archive: Archive, layout: Layout, way: Way, scene: Scene) -> None:
+    def __init__(self, archive: FmuArchive, layout: MappedColumns, way: FmuInterface, scene: Scene) -> None:
         from fmpy import extract
 
         self._archive, self._layout, self._way, self._scene = archive, layout, way, scene
@@ -166,7 +166,7 @@ def _path(name: str, values: Real) -> MarkerPath:
     return MarkerPath(values[:, :3].copy(), continuous(quaternions), values[:, -6:].copy())
 
 
-def _snapshot(outputs: Mapping[str, Any], layout: Layout, columns: Mapping[str, Real]) -> Snapshot:
+def _snapshot(outputs: Mapping[str, Any], layout: MappedColumns, columns: Mapping[str, Real]) -> Snapshot:
     """The first sample."""
     accelerations = {
         group.name: np.array([columns[name][0] for name in names])

@@ -8,7 +8,7 @@ from typing import Any
 
 import msgspec
 
-from crosscheck.engines.fmu.archive import Archive
+from crosscheck.engines.fmu.archive import FmuArchive
 from crosscheck.engines.fmu.layout import own_parameters
 from flexmb.scene.files import dumps
 from flexmb.scene.schema import Scene
@@ -18,13 +18,13 @@ from flexmb.scene.without_start import without_start
 WORDS = ("name", "description", "allow", "total_loads")  # of a scene, and no part of what it models
 
 
-def is_own_scene(archive: Archive, scene: Scene) -> bool:
+def is_own_scene(archive: FmuArchive, scene: Scene) -> bool:
     """Whether an FMU that flexmb has exported is of this very scene, but for what it does not give."""
     assert archive.own is not None
     return _digest(_seen(archive, scene)) == archive.own.scene
 
 
-def own_obstacle(archive: Archive, scene: Scene) -> str:
+def own_obstacle(archive: FmuArchive, scene: Scene) -> str:
     """Why an FMU that flexmb has exported does not model a scene with other parameters and start values, "" if it
     does."""
     assert archive.own is not None
@@ -62,7 +62,7 @@ def foreign_obstacle(modelled: Scene, scene: Scene, paths: Iterable[str]) -> str
     )
 
 
-def _seen(archive: Archive, scene: Scene) -> Scene:
+def _seen(archive: FmuArchive, scene: Scene) -> Scene:
     """The scene without the markers that the FMU does not give, and without sums of loads, which no export has."""
     there = set(archive.names)
     given = tuple(marker for marker in scene.markers if f"{marker.name}.position.x" in there)
