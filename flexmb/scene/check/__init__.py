@@ -10,7 +10,7 @@ from flexmb.scene.check.beams import beams
 from flexmb.scene.check.connectors import connectors, friction_that_sticks
 from flexmb.scene.check.control import control
 from flexmb.scene.check.events import events
-from flexmb.scene.check.exact_beams import jumps
+from flexmb.scene.check.exact_beams import jumps, tapers
 from flexmb.scene.check.hinges import closures, couplings, hinges, point_masses, wheels
 from flexmb.scene.check.inertia import rigid_bodies
 from flexmb.scene.check.modal import modal_bodies, modal_states
@@ -60,7 +60,7 @@ def _problems(scene: Scene, t_end: float | None, t_start: float) -> list[Defect]
     problems += [problem for check in (numbers, *STRUCTURE, *PHYSICS) for problem in check(scene)]
     problems += functions(scene, t_end, t_start)
     if all(isinstance(problem, Doubt) for problem in problems):  # it needs valid numbers and names, and a tree
-        problems += [*moved_inertia(scene), *jumps(scene)]
+        problems += [*moved_inertia(scene), *jumps(scene), *tapers(scene)]
     return problems
 
 

@@ -28,10 +28,14 @@ from flexmb.scene.strains import (
     points_of_piece,
     polynomials,
 )
+from flexmb.scene.taper import too_stiff
 
 POINTS_DOUBTED, POLYNOMIALS_DOUBTED, POLYNOMIALS_ENOUGH = 1e-2, 1e-1, 1e-2
 """Of what turns at rest, left out: points that leave the first put the axis some 1e-4 of its length off; polynomials
 that leave the second make the first frequency of a coil some 1 % too high, as two do that of a straight beam."""
+
+TAPER_DOUBTED, TAPER_ENOUGH, TAPER_MOST = 1e-2, 2e-3, 20
+"""Of the deflection under a load at the tip, left out. Where more polynomials were needed, pieces need fewer."""
 
 
 def exact_beam(place: Place, body: BeamBody) -> Iterator[Defect]:
@@ -140,6 +144,36 @@ def jumps(scene: Scene) -> Iterator[Doubt]:
                 "flexmb.surrogate.substructured",
                 "uncut_beam",
             )
+
+
+def tapers(scene: Scene) -> Iterator[Doubt]:
+    """Polynomials of beams of level exact that cannot follow how the stiffness varies, of a scene without defects."""
+    for i, body in enumerate(scene.bodies):
+        if isinstance(body, BeamBody) and body.level == "exact" and len(body.stations) > 1:
+            yield from _tapered(ROOT.key("bodies", i, "modes").named(f'body "{body.name}"'), body)
+
+
+def _tapered(place: Place, body: BeamBody) -> Iterator[Doubt]:
+    """The same of one beam and of the strain that is worst."""
+    found = polynomials(body)
+    parts = {
+        strain: next(too_stiff(body, strain, range(count, count + 1)), (count, 0.0))[1]
+        for strain, count in found.items()
+    }
+    worst = max(parts, key=lambda strain: parts[strain])
+    if parts[worst] <= TAPER_DOUBTED:
+        return
+    more = too_stiff(body, worst, range(found[worst] + 1, TAPER_MOST))
+    enough = next((count for count, left in more if left <= TAPER_ENOUGH), TAPER_MOST)
+    what = f"{found[worst]} polynomials of {worst} do not follow how the stiffness varies along the beam"
+    key = "count" if body.modes.polynomials is None else "polynomials"
+    remedy = f"{_more(key, enough, TAPER_MOST)}, or cut it at a station where the stiffness has a kink"
+    yield Doubt(
+        str(place.key(key)),
+        f"{what}, and leave out {parts[worst]:.2g} of its deflection at rest",
+        remedy,
+        "few_polynomials",
+    )
 
 
 def without_strains(place: Place, body: BeamBody) -> Iterator[Defect]:

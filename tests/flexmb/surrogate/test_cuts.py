@@ -214,3 +214,31 @@ def test_refusals() -> None:
     wrong = replace(full, bodies=(replace(full.bodies[0], modes=fm.Modes(count=2, cuts=("port",))), full.bodies[1]))
     with pytest.raises(fm.SceneError, match="cuts is for strains"):
         fm.check_scene(wrong)
+
+
+@pytest.mark.parametrize(("ratio", "is_told"), [(4.0, False), (10.0, True)])
+def test_a_stiffness_that_polynomials_do_not_follow_is_told(ratio: float, is_told: bool) -> None:
+    """Of a beam that tapers from its middle to both ends; what is left out is what an equilibrium lacks."""
+    section = [replace(SECTION, x_m=x, EIz_Nm2=EI) for x, EI in ((0.0, 1.0), (0.37, ratio), (1.0, 1.0))]
+
+    def tapered(count: int) -> fm.Scene:
+        builder = stem(fm.Modes(count=count, families=PLANE), section=section)
+        return builder.force("f", "stem", node="tip", direction=(0, 1, 0), function=fm.Constant(value=1e-3)).scene()
+
+    def doubts(count: int) -> list[str]:
+        return [str(each) for each in fm.check_scene(replace(tapered(count), allow=("wave_speed", "thick_section")))]
+
+    def lacking(count: int) -> float:
+        """Of the closed form P times the integral of (1 - x)^2 / EI."""
+        system = fm.compile(tapered(count))
+        tip = system.evaluate(0.0, fm.equilibrium(system).q, np.zeros(system.nu)).markers["tip"].position[1]
+        x, w = np.polynomial.legendre.leggauss(40)
+        parts = [(0.5 * (a + b) + 0.5 * (b - a) * x, 0.5 * (b - a) * w) for a, b in ((0.0, 0.37), (0.37, 1.0))]
+        EI = [np.interp(at, [0.0, 0.37, 1.0], [1.0, ratio, 1.0]) for at, _ in parts]
+        sinks = sum(float(np.sum(w * (1 - at) ** 2 / K)) for (at, w), K in zip(parts, EI, strict=True))
+        return 1.0 - float(tip) / (1e-3 * sinks)
+
+    assert bool(doubts(4)) == is_told == (lacking(4) > 1e-2)
+    if is_told:
+        assert f"leave out {lacking(4):.2g} of its deflection" in doubts(4)[0] and "count = 9" in doubts(4)[0]
+        assert lacking(9) < 2e-3 and not doubts(9)
