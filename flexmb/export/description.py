@@ -122,12 +122,14 @@ def _experiment(model: ExportedModel, step: float) -> str:
 
 
 class _Line:
-    """A variable: its text, and what the structure of the model says of it. rate_of: number of its state."""
+    """A variable: its text, and what the structure of the model says of it. words: causality, variability and
+    description. rate_of: number of its state."""
 
     def __init__(
-        self, name: str, number: int, causality: str, variability: str, about: str, unit: str,
-        start: float | None = None, rate_of: int | None = None,
+        self, name: str, number: int, words: tuple[str, str, str], unit: str, start: float | None = None,
+        rate_of: int | None = None,
     ) -> None:  # fmt: skip
+        causality, variability, about = words
         self.unit, self.causality, self.number, self.is_rate = unit, causality, number, rate_of is not None
         self.is_computed = start is None and causality != "independent"
         is_exact = "" if causality in ("input", "independent") else "calculated" if self.is_computed else "exact"
@@ -158,11 +160,11 @@ def _variables(model: ExportedModel, version: Version, step: float) -> Iterator[
     count, number = len(model.states), 0
     for i, state in enumerate(model.states):
         what = "coordinate" if i < model.coordinates else "speed" if i < count - 1 else "work done on the system"
-        yield _Line(state.name, number, "output", "continuous", what, state.unit, state.start)
+        yield _Line(state.name, number, ("output", "continuous", what), state.unit, state.start)
         number += 1
     for i, state in enumerate(model.states):
         unit = per_second(state.unit)
-        yield _Line(f"der({state.name})", number, "local", "continuous", "its rate", unit, rate_of=i)
+        yield _Line(f"der({state.name})", number, ("local", "continuous", "its rate"), unit, rate_of=i)
         number += 1
     for each in model.numbers.changeable:
         candidate = each.candidate
@@ -171,16 +173,16 @@ def _variables(model: ExportedModel, version: Version, step: float) -> Iterator[
         else:
             words = "parameter", "fixed" if candidate.is_prescribed else "tunable", f"{candidate.path} of the scene"
         name = f"{'inputs' if candidate.is_input else 'parameters'}.{candidate.name}"
-        yield _Line(name, number, *words, candidate.unit or "1", each.value)
+        yield _Line(name, number, words, candidate.unit or "1", each.value)
         number += 1
     for output in model.outputs:
         about = "World axes" if "." in output.name else ""
-        yield _Line(output.name, number, "output", "continuous", about, output.unit)
+        yield _Line(output.name, number, ("output", "continuous", about), output.unit)
         number += 1
     if step:
-        yield _Line("step", number, "parameter", "fixed", "largest step of Co-Simulation", "s", step)
+        yield _Line("step", number, ("parameter", "fixed", "largest step of Co-Simulation"), "s", step)
     if version == "3":
-        yield _Line("time", number + 1, "independent", "continuous", "", "s")
+        yield _Line("time", number + 1, ("independent", "continuous", ""), "s")
 
 
 def per_second(unit: str) -> str:

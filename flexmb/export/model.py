@@ -114,7 +114,7 @@ def model(scene: Scene, inputs: Sequence[str] = (), derivatives: bool = False, t
     is wrong, PathError for an input that is not there, ValueError for another target.
     """
     prepared, kinds = tabled(scene, inputs, derivatives)
-    return prepared._replace(code=_code(prepared.identifier, kinds, target))
+    return prepared._replace(code=machine_code(prepared.identifier, kinds, target))
 
 
 def tabled(
@@ -247,7 +247,8 @@ def _without_doubt(block: Image, tables: tuple[Any, ...]) -> Image:
     return Image(words, block.stored, block.addresses, block.bundles, block.arrays)
 
 
-def _code(identifier: str, kinds: tuple[Any, ...], target: str) -> bytes:
+def machine_code(identifier: str, kinds: tuple[Any, ...], target: str = LEVEL) -> bytes:
+    """An object file with the entry points for tables of these types, which `tabled` gives; for one of `TARGETS`."""
     (c, w, out), state = kinds[:TANGENT], (REAL, WHOLE, WHOLE)
     rates, outputs, settle = entry.rates, entry.outputs, entry.settle
     derivatives, along = entry.derivatives, entry.outputs_along

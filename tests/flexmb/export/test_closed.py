@@ -190,7 +190,7 @@ def test_c_runs_as_the_scene(exported: ExportedModel, scene: fm.Scene, tmp_path:
 def test_derivatives_of_undeformed_inertia_are_refused_with_the_remedy(monkeypatch: Any) -> None:
     beams = mechanisms.tilted_four_bar(flexible=True, drive=None)
     bodies = tuple(msgspec.structs.replace(body, level="ruthless") for body in beams.bodies)
-    monkeypatch.setattr("flexmb.export.model._code", lambda *_: pytest.fail("compiled"))
+    monkeypatch.setattr("flexmb.export.model.machine_code", lambda *_: pytest.fail("compiled"))
     with pytest.raises(NotExportable, match="leave the derivatives out"):
         model(msgspec.structs.replace(beams, bodies=bodies), derivatives=True)
 

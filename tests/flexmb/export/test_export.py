@@ -368,7 +368,7 @@ def stopped() -> fm.Scene:
     [(controlled, "--input HINGE"), (stopped, "take the events out")],
 )
 def test_what_is_not_exported_is_refused_with_the_remedy(made: Any, words: str, monkeypatch: Any) -> None:
-    monkeypatch.setattr("flexmb.export.model._code", lambda *_: pytest.fail("compiled"))
+    monkeypatch.setattr("flexmb.export.model.machine_code", lambda *_: pytest.fail("compiled"))
     with pytest.raises(NotExportable, match=words):
         model(made())
 
