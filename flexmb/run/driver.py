@@ -18,6 +18,7 @@ from flexmb.integrate.settings import Settings
 from flexmb.integrate.watch import UNKNOWN, Watch
 from flexmb.run.agenda import DIRECTIONS, FEW, Agenda, Chattering, Sides, stand
 from flexmb.run.event_record import EventMemory, EventRecord
+from flexmb.run.frictions import Frictions
 from flexmb.run.origin import Beginning
 from flexmb.run.propagate import Raw, unmoved
 from flexmb.run.provenance import Making
@@ -74,6 +75,7 @@ class Driver:
         self._times, self._settings, self._taken_up, self._made_by = times, settings, taken_up, made_by
         given = None if taken_up is None else taken_up.given
         self._situation = Situation(system, settings, algorithm, stabilise, given)
+        self._frictions = Frictions(self._situation) if any_sticks(self._situation.system.scene) else None
         self._agenda = Agenda(self._situation, times)
         self._sides = Sides(self._agenda)
         self._segments = Segments(self._sides, times)
@@ -129,8 +131,7 @@ class Driver:
     @property
     def _has_instants(self) -> bool:
         """Whether anything may happen between two steps."""
-        scene = self._situation.system.scene
-        return bool(scene.events) or any_sticks(scene)
+        return bool(self._situation.system.scene.events) or self._frictions is not None
 
     def _keep_leg(self, begin: Beginning, end: Raw, early: float = 0.0) -> None:
         """Append a part of the run to its course, before the events at its end change the system."""
@@ -192,8 +193,10 @@ class Driver:
 
     def _settle(self, raw: Raw, found: Sequence[str], y: Real, early: float = 0.0) -> None:
         """Decide which friction sticks, see `flexmb.run.frictions`; found: names of events that happened."""
+        if self._frictions is None:
+            return
         is_start = self._whole is None
-        records, changed = self._situation.settle(raw, y, found)
+        records, changed = self._frictions.settle(raw, y, found)
         self._happened += [] if is_start else [replace(record, early=early) for record in records]
         if changed:
             self._agenda.take()

@@ -15,20 +15,18 @@ again, until nothing changes. If a set of phases comes up twice, the phases cann
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from flexmb.run.event_record import EventRecord
 from flexmb.run.impulses import mobility
 from flexmb.run.propagate import Raw
+from flexmb.run.situation import Situation
 from flexmb.scene.connectors import Phase
 from flexmb.scene.sticking import DIRECTIONS, SLIPS, Sticking, sticking
 from flexmb.tables.state import DynamicsError
 from flexmb.typing import Real
-
-if TYPE_CHECKING:
-    from flexmb.run.situation import EventInstant, Situation
 
 AT_REST = 2.0**-40  # fraction of the kinetic energy's root: what moves by less is at rest to rounding
 IMMOVABLE = 2.0**-40  # relative: a coordinate with less mobility is held by others, and carries no friction
@@ -49,11 +47,11 @@ class Frictions:
         self._situation = situation
         self._known: dict[str, Phase] = {each.name: each.connector.phase for each in sticking(situation.system.scene)}
 
-    def settle(self, raw: Raw, y: Real, found: Collection[str], instant: EventInstant) -> Settled:
+    def settle(self, raw: Raw, y: Real, found: Collection[str]) -> Settled:
         """Decide all phases at the end of an integration, with y = [q, u, work], which changes in place only where a
         speed is at rest but for rounding. found: names of the events of friction that happened. DynamicsError if they
         cannot be decided."""
-        situation, before = self._situation, self._known
+        situation, before, instant = self._situation, self._known, self._situation.instant(raw.t, y)
         frictions = [each for each in sticking(situation.system.scene) if not situation.holds_otherwise(each)]
         phases: dict[str, Phase] = dict.fromkeys(before, "idle")
         places = [situation.speed_place(each.coordinate) for each in frictions]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace as replace_fields
 from functools import partial
@@ -15,7 +15,6 @@ from msgspec.structs import replace
 from flexmb.integrate.settings import Settings
 from flexmb.kept import kept
 from flexmb.run.event_record import EventRecord
-from flexmb.run.frictions import Frictions, Settled
 from flexmb.run.impulses import Struck, struck
 from flexmb.run.origin import Beginning
 from flexmb.run.outputs import doubt_about, observed
@@ -72,7 +71,6 @@ class Situation:
         self._built = [system]
         self.doubts: list[str] = []
         """Warnings about integrations that did not fail."""
-        self._frictions = Frictions(self) if any_sticks(system.scene) else None
 
     def integration(self) -> AbstractContextManager[Integration]:
         """An integration of the present system for exclusive use within the context."""
@@ -127,7 +125,7 @@ class Situation:
     def happen(self, event: SceneEvent, raw: Raw, y: Real) -> list[EventRecord]:
         """Apply the actions of an event at the end of an integration to y = [q, u, work], in place. A coordinate whose
         rebound is negligible comes to rest on its stop."""
-        arriving, at = y.copy(), self._instant(raw.t, y)
+        arriving, at = y.copy(), self.instant(raw.t, y)
         for action in event.actions:
             self._do(action, at)
         records = [_recorded(event.name, at, self._state(at.t, at.y))]
@@ -142,18 +140,11 @@ class Situation:
     def rest(self, event: SceneEvent, impact: Impact, push: int, t: float, y: Real) -> EventRecord:
         """Stop the coordinate of an impact and hold it on its stop, until an event releases it before the stop would
         pull; a motor that acts along it remains. push: the sign of the stop's load."""
-        name, at = impact.coordinate, self._instant(t, y)
+        name, at = impact.coordinate, self.instant(t, y)
         self._free_of_friction(at)
         self._strike(at, name, 0.0)
         self._hold(at, name, leaves(event, name, push))
         return _recorded(f"{event.name}: at rest", at, self._state(at.t, at.y))
-
-    def settle(self, raw: Raw, y: Real, found: Collection[str]) -> Settled:
-        """Decide which friction sticks after what happened at the end of an integration: see `flexmb.run.frictions`.
-        found: names of events of friction; y = [q, u, work]."""
-        if self._frictions is None:
-            return Settled([], set())
-        return self._frictions.settle(raw, y, found, self._instant(raw.t, y))
 
     def holds_otherwise(self, friction: Sticking) -> bool:
         """Whether a latch or a stop holds the coordinate of friction."""
@@ -184,7 +175,7 @@ class Situation:
     def at_rest(self, coordinate: str, t: float, y: Real) -> Real:
         """A copy of y = [q, u, work] after an impulse that makes the speed of a coordinate zero."""
         stopped = y.copy()
-        self._strike(self._instant(t, stopped), coordinate, 0.0)
+        self._strike(self.instant(t, stopped), coordinate, 0.0)
         return stopped
 
     def speed(self, coordinate: str, y: Real) -> float:
@@ -249,7 +240,7 @@ class Situation:
 
     def _free_of_friction(self, at: EventInstant) -> None:
         """Let go what friction holds: its load is bounded, so that it takes no part in an impulse."""
-        if self._frictions is not None:
+        if any_sticks(self.system.scene):
             self.with_friction({each.name: "idle" for each in sticking(self.system.scene)}, (), at)
 
     def _given_closure(self, name: str, *, closed: bool) -> Closure:
@@ -364,7 +355,8 @@ class Situation:
         if self.system.closures is not None:
             self.system.closures.begin_at(at.t, at.y, before.closures)
 
-    def _instant(self, t: float, y: Real) -> EventInstant:
+    def instant(self, t: float, y: Real) -> EventInstant:
+        """An instant at which something is going to change y = [q, u, work] in place."""
         return EventInstant(t, y, self._state(t, y), float(y[-1]), {}, {}, {})
 
     def _state(self, t: float, y: Real) -> State:

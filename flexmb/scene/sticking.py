@@ -17,8 +17,8 @@ from flexmb.scene.control import DriveSensor
 from flexmb.scene.events import Latch, Release, SceneEvent
 from flexmb.scene.functions import Constant
 from flexmb.scene.keys import split_unit
-from flexmb.scene.schema import Scene, Wheel
-from flexmb.scene.tree import coordinate_of, coordinates, rate_name, scalar_paths
+from flexmb.scene.schema import Scene
+from flexmb.scene.tree import coordinate_of, rate_name, scalar_paths
 
 MARGIN = 2.0**-42
 """Relative to static friction: what slips holds this much more. So the acceleration with which it starts has its sign
@@ -62,8 +62,8 @@ def sticking(scene: Scene) -> Iterator[Sticking]:
     for connector in scene.connectors:
         if isinstance(connector, HingeFriction) and sticks(connector):
             item, place = coordinate_of(scene, connector)
-            own = "angle" if isinstance(item, Wheel) else coordinates(item)[place].name
-            yield Sticking(connector, f"{item.name}.{own}", item.name, place)
+            own = [name for name in scalar_paths(scene) if name.rpartition(".")[0] == item.name]
+            yield Sticking(connector, own[place], item.name, place)
 
 
 NEVER_ZERO = 1e-150

@@ -47,7 +47,7 @@ WRONG = {
     "stops crossed": (
         lambda b: b.angular_spring("s", "pivot", lower=1.0, upper=0.0, stop_stiffness=1.0), "leave nothing between",
     ),
-    "no smoothing": (lambda b: b.angular_friction("s", "pivot", sliding=1.0, smoothing=0.0), "smoothing speed"),
+    "negative smoothing": (lambda b: b.angular_friction("s", "pivot", sliding=1.0, smoothing=-0.1), "smoothing speed"),
     "static alone": (
         lambda b: b.angular_friction("s", "pivot", sliding=1.0, static=2.0, smoothing=0.1), "belong together",
     ),

@@ -14,6 +14,7 @@ from scipy.integrate import quad
 import flexmb as fm
 from crosscheck.engines.checked import CheckedEngine
 from crosscheck.engines.native import NativeEngine
+from crosscheck.library.mutations.connectors import MUTATIONS
 from flexmb.dense.dense_system import DenseSystem
 from flexmb.export.refusals import NotExportable, refuse
 from flexmb.integrate.catalogue import INTEGRATORS
@@ -314,3 +315,10 @@ def test_engines_whose_friction_is_smooth_refuse_it() -> None:
     found = CheckedEngine(Smooth()).supports(thrown())
     assert found.kind == "no" and "never sticks" in found.reason
     assert CheckedEngine(NativeEngine()).supports(thrown()).kind == "exact"
+
+
+def test_a_case_can_leave_its_friction_out() -> None:
+    """The fault "no friction" of a case: a scene that can be run, without any load."""
+    [mutation] = [each for each in MUTATIONS if each.name == "connector_losses"]
+    run = fm.simulate(mutation.change(thrown(), "dry"), 1.0)
+    assert not run.events and not run.hinge_forces["dry"].any()
