@@ -39,7 +39,7 @@ CASES = {  # with the largest step of Co-Simulation (s)
     "wheels/spin_up": 2e-3, "wheel_gyrostat/torque_driven": 2e-3, "closed_chains/four_bar": 1e-3,
     "closed_chains/slider_crank": 1e-3, "manipulators/two_joints": 1e-3, "rotors/unbalanced": 1e-3,
     "spacecraft/slosh": 1e-3, "deploying_boom/rigid": 2e-3,
-    "pendulums/bar_and_plate": 1e-3, "tops/lagrange": 1e-3,
+    "sliders/oscillator": 1e-3, "pendulums/bar_and_plate": 1e-3, "tops/lagrange": 1e-3,
 }  # fmt: skip
 SENSITIVE = "pendulums/bar_and_plate", "tops/lagrange"
 """Motions of which CVode's finest tolerance leaves U above the goals; Co-Simulation meets them."""
