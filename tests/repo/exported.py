@@ -2,8 +2,8 @@
 
 python -m tests.repo.exported
 
-Each scene is refused, or assembled, with the block of memory that an instance of it has; the machine code of a few is
-made and run by tests/flexmb/export.
+Each scene is refused, or assembled, with the block of memory that an instance of it has; tests/flexmb/export runs them,
+all of them in its slow test_library.py.
 """
 
 import re
