@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -13,6 +15,7 @@ from flexmb.output.files import check_folder, folder
 from flexmb.output.printable import printable
 
 if TYPE_CHECKING:
+    from flexmb.export.model import ExportedModel
     from flexmb.interchange.superelement import Tie
     from flexmb.scene.schema import Scene
 
@@ -161,8 +164,22 @@ def export(
             raise ValueError("a BODY is written by --out FILE; --fmu, --c and --page write whole scenes, without one")
         if body is not None and out is not None:
             _export_body(scene, body, out, dialect)
-        else:
-            _export_program(scene, fmu, c, page, inputs or [], step, derivatives, fmi, target, sliders or [])
+            return
+        from flexmb.export.emitted import LEVEL
+        from flexmb.export.web import export_page
+        from flexmb.export.writing import export_c, export_fmu
+
+        asked = tuple(inputs or ())
+        if fmu is not None:
+            write = partial(export_fmu, path=fmu, inputs=asked, step=step, derivatives=derivatives, fmi=fmi)
+            _export_program(scene, fmu, fmu.parent, write)
+        elif page is not None:
+            ranges = dict(map(_slider, sliders or ())) or None
+            write = partial(export_page, path=page, sliders=ranges, inputs=asked, step=step)
+            _export_program(scene, page, page.parent, write)
+        elif c is not None:
+            write = partial(export_c, folder=c, inputs=asked, derivatives=derivatives, target=target or LEVEL)
+            _export_program(scene, c, c, write)
 
 
 def _export_body(scene: Path, body: str, out: Path, dialect: Literal["wallrapp", "fembs"]) -> None:
@@ -183,29 +200,15 @@ def _export_body(scene: Path, body: str, out: Path, dialect: Literal["wallrapp",
     console.print("wrote", str(out), soft_wrap=True)
 
 
-def _export_program(
-    scene: Path, fmu: Path | None, c: Path | None, page: Path | None, inputs: list[str], step: float | None,
-    derivatives: bool, fmi: Literal["2", "3"], target: str | None, sliders: list[str],
-) -> None:  # fmt: skip
-    from flexmb.export.emitted import LEVEL
-    from flexmb.export.web import export_page
-    from flexmb.export.writing import export_c, export_fmu
+def _export_program(scene: Path, place: Path, where: Path, write: Callable[[Scene], ExportedModel]) -> None:
+    """Write a scene to a place in the folder `where`, and say what it can change."""
     from flexmb.scene.files import load_scene
 
-    ranges = dict(map(_slider, sliders)) or None
     loaded = load_scene(scene)
+    check_folder(where)
+    folder(where)
     with console.status(Text(f"compiling {scene}")):
-        if fmu is not None:
-            check_folder(fmu.parent)
-            folder(fmu.parent)
-            model = export_fmu(loaded, fmu, inputs=inputs, step=step, derivatives=derivatives, fmi=fmi)
-        elif page is not None:
-            check_folder(page.parent)
-            model = export_page(loaded, page, sliders=ranges, inputs=inputs, step=step)
-        else:
-            assert c is not None  # one of the four is given
-            check_folder(c)
-            model = export_c(loaded, c, inputs=inputs, derivatives=derivatives, target=target or LEVEL)
+        model = write(loaded)
     numbers = model.numbers.changeable
     for what, names in (
         ("inputs", [each.candidate.name for each in numbers if each.candidate.is_input]),
@@ -214,7 +217,7 @@ def _export_program(
         console.print(printable(f"{what}: {', '.join(names) or 'none'}"), soft_wrap=True)
     _tell(tuple(f"{name} is fixed: {why}" for name, why in model.numbers.fixed.items()))
     _tell((model.open_loads,) if model.open_loads else ())
-    console.print("wrote", str(fmu or c or page), soft_wrap=True)
+    console.print("wrote", str(place), soft_wrap=True)
 
 
 def _slider(text: str) -> tuple[str, tuple[float, float] | None]:

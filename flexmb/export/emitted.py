@@ -34,7 +34,7 @@ BUILDING = "x86_64"  # the machines that export
 AVX2 = ",".join(f"+{name}" for name in LEVELS[LEVEL])
 
 
-class Target(NamedTuple):
+class Processors(NamedTuple):
     """Processors that code is emitted for, as LLVM names them.
 
     described: for people. fused: whether they multiply and add with one rounding; by `fma` of a C library it would take
@@ -50,15 +50,15 @@ class Target(NamedTuple):
 
 
 TARGETS = {
-    LEVEL: Target("x86-64 with AVX2", "x86_64-unknown-linux-gnu", LEVEL, AVX2),
-    "aarch64": Target("ARM of 64 bits", "aarch64-unknown-linux-gnu", "generic"),
-    "armv7": Target("ARM of 32 bits with VFPv4, hard float", "armv7-unknown-linux-gnueabihf", "cortex-a7"),
-    "cortex-m7": Target(
+    LEVEL: Processors("x86-64 with AVX2", "x86_64-unknown-linux-gnu", LEVEL, AVX2),
+    "aarch64": Processors("ARM of 64 bits", "aarch64-unknown-linux-gnu", "generic"),
+    "armv7": Processors("ARM of 32 bits with VFPv4, hard float", "armv7-unknown-linux-gnueabihf", "cortex-a7"),
+    "cortex-m7": Processors(
         "Cortex-M7 with double precision, hard float", "thumbv7em-unknown-none-eabihf", "cortex-m7",
         relocation="static",
     ),
-    "riscv64": Target("RISC-V, rv64gc", "riscv64-unknown-linux-gnu", "generic-rv64", "+m,+a,+f,+d,+c"),
-    "wasm32": Target("WebAssembly", "wasm32-unknown-unknown", "generic", "+simd128", fused=False),
+    "riscv64": Processors("RISC-V, rv64gc", "riscv64-unknown-linux-gnu", "generic-rv64", "+m,+a,+f,+d,+c"),
+    "wasm32": Processors("WebAssembly", "wasm32-unknown-unknown", "generic", "+simd128", fused=False),
 }  # fmt: skip
 """Processors by name: the options of `flexmb export --c --target`."""
 OF_C = {"numba_nextafter": "nextafter"}
@@ -140,7 +140,7 @@ def _keep_only(module: Any, entries: set[str]) -> None:
     manager.run(module, binding.create_pass_builder(_machine(TARGETS[LEVEL]), options))
 
 
-def _for_target(module: Any, target: Target) -> Any:
+def _for_target(module: Any, target: Processors) -> Any:
     """The machine that makes code for a target, which the module is told of."""
     machine = _machine(target)
     module.triple, module.data_layout = target.triple, str(machine.target_data)
@@ -152,7 +152,7 @@ def _for_target(module: Any, target: Target) -> Any:
     return machine
 
 
-def _machine(target: Target) -> Any:
+def _machine(target: Processors) -> Any:
     binding.initialize_all_targets()
     binding.initialize_all_asmprinters()
     try:

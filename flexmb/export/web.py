@@ -86,7 +86,7 @@ def compiler() -> list[str]:
     if find_spec("ziglang") is None:
         raise NotExportable(
             "a page that computes needs a compiler to WebAssembly, the package ziglang (100 MB), which is not "
-            "installed: pip install 'flexmb[web]'; `flexmb view` writes a page of a run without it"
+            "installed: pip install ziglang; `flexmb view` writes a page of a run without it"
         )
     return [sys.executable, "-m", "ziglang", "cc"]
 

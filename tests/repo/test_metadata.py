@@ -44,6 +44,7 @@ SIGNS = {
     "rerun-sdk": "import rerun", "selenium": "importorskip(\"selenium", "sphinx": "\"-m\", \"sphinx\"",
     "furo": "html_theme = \"furo\"", "myst-parser": "\"myst_parser\"",
     "drake": "from pydrake", "bsk": "from Basilisk", "cmeel-eigen": "include/eigen3",
+    "ziglang": '"-m", "ziglang"', "wasmtime": 'importorskip("wasmtime',
     "KratosStructuralMechanicsApplication": "import KratosMultiphysics.StructuralMechanicsApplication",
 }  # fmt: skip
 EXTRAS = PYPROJECT["project"]["optional-dependencies"]

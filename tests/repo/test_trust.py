@@ -21,6 +21,7 @@ STARTS = {"subprocess", "runpy", "urllib.request", "http", "socket", "requests"}
 PLACES = {
     "flexmb/__init__.py": "names of flexmb itself", "flexmb/control/user.py": "laws that a scene names",
     "flexmb/export/emitted.py": "kernels of flexmb, to take their code out",
+    "flexmb/export/web.py": "the compiler ziglang, for the same text",
     "flexmb/export/writing.py": "the C compiler, for text of flexmb's own in which names of a scene are escaped",
     "flexmb/jit/direct.py": "text of flexmb's own",
     "flexmb/jit/linking.py": "modules of flexmb and of what it compiles with",
