@@ -32,6 +32,7 @@ SHORTENINGS = 20  # by 4, of a step of overdamped motion
 RELAXATIONS = 200  # steps of overdamped motion
 FIRST, LONGEST = 0.1, 0.5  # lengths of steps, parts of a displacement of all free coordinates by 1
 DOUBLE = 2.0**-20  # imaginary part that rounding gives to double eigenvalues
+STRAINED = 0.01  # of a displacement of length 1 without stiffness: strains from which on it is no motion of free bodies
 RANK = 1e-14  # stiffness relative to the largest; directions with less are free to move and are not corrected
 
 
@@ -156,6 +157,8 @@ def _newton(equations: Equations, state: State) -> _Found | None:
                 removed = now.left <= RESIDUAL * first.size + ROUNDING * now.stiffness * now.scale
                 if not removed:
                     return None  # no displacement removes the rest
+                if now.left > RESIDUAL * first.size:
+                    _refuse_unresolved(equations, now)
                 return _Found(now.at, now.settling, undamped and not first.settling)
             moved = _damped(equations, now)
             if moved is None:
@@ -182,7 +185,7 @@ class _Linearised:
         U, values, Vt = np.linalg.svd(forward(self._root, half), full_matrices=False)
         self.stiffness = float(values[0]) if len(values) else 0.0
         kept = values > RANK * self.stiffness
-        self._U, self._back = U[:, kept], Vt[kept].T / values[kept]
+        self._U, self._back, self._free = U[:, kept], Vt[kept].T / values[kept], Vt[~kept].T
         self.scale = float(np.sqrt(np.trace(M)))
         self.settling = _is_settling(forward(self._own, half[moving]))
         z = forward(self._root, at.load)
@@ -191,6 +194,12 @@ class _Linearised:
         self.length = float(np.linalg.norm(self._along))
         self.step = np.zeros(len(z))
         self.step[moving] = backward(self._own, self._along)
+
+    def free(self) -> Real:
+        """(n,k) displacements of length 1 without stiffness beside the largest one, by `RANK`."""
+        found = np.zeros((len(self.step), self._free.shape[1]))
+        found[self._moving] = backward(self._own, self._free)
+        return found
 
     def correction(self, load: Real) -> Real:
         """The step that removes a load (n,) as far as the tangent here says, in orthonormal coordinates."""
@@ -201,6 +210,28 @@ class _Linearised:
         """How far the load (n,) after `factor` of the step is from what the tangent says, as part of that step."""
         ahead = self.correction(load) - (1.0 - factor) * self._along
         return float(np.linalg.norm(ahead)) / (factor * self.length)
+
+
+def _refuse_unresolved(equations: Equations, now: _Linearised) -> None:
+    """EquilibriumError if strains of a body are among the directions without stiffness, along which load is left.
+
+    A strain is never free: its stiffness is below the rounding of the largest one, so that the load along it is neither
+    removed nor told from rounding.
+    """
+    free, mass = now.free(), now.at.mass
+    strains = np.zeros(equations.system.nu, bool)
+    for body in equations.constants.body:
+        strains[int(body["etad_index"]) : int(body["etad_index"] + body["modes"])] = True
+    own = free * strains[equations.free[now.at.chosen]][:, None]
+    shares = np.einsum("ik,ij,jk->k", own, mass, own)
+    if np.max(shares, initial=0.0) <= STRAINED:
+        return
+    worst = int(np.argmax(np.abs(own[:, np.argmax(shares)])))
+    raise EquilibriumError(
+        f'scene "{equations.system.scene.name}": no equilibrium can be told: the stiffness along '
+        f"{equations.labels.displacements[now.at.chosen[worst]][0]} is below {RANK:g} of the largest one, and lost in "
+        "rounding. Give the body fewer polynomials or modes, or pieces"
+    )
 
 
 def _damped(equations: Equations, now: _Linearised) -> tuple[State, float] | None:
