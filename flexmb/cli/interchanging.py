@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from flexmb.scene.schema import Scene
 
 
+ONLY = "--input and --derivatives are for --fmu and --c, --fmi and --step for --fmu; --page takes --input and --step"
 MANY = 8_000  # nodes in a range: more than a structure can have
 
 
@@ -153,15 +154,15 @@ def export(
     """
     with no_traceback():
         if ((inputs or derivatives) and out is not None) or (step is not None and fmu is None and page is None):
-            raise ValueError("--input and --derivatives are not for --out, --step is for --fmu and --page")
+            raise ValueError(ONLY)
         if (target is not None and c is None) or (sliders and page is None) or (derivatives and page is not None):
-            raise ValueError("--target is for --c, --slider for --page, --derivatives for --fmu and --c")
+            raise ValueError("--target is for --c, --slider for --page, --derivatives are for --fmu and --c")
         if fmi != "2" and fmu is None:
-            raise ValueError("--fmi is for --fmu")
+            raise ValueError(ONLY)
         if sum(place is not None for place in (out, fmu, c, page)) != 1:
             raise ValueError("give one of --out FILE (with a BODY), --fmu FILE, --c FOLDER and --page FILE")
         if (body is None) != (out is None):
-            raise ValueError("a BODY is written by --out FILE; --fmu, --c and --page write whole scenes, without one")
+            raise ValueError("a BODY is written by --out FILE; the others write the whole scene, without a BODY")
         if body is not None and out is not None:
             _export_body(scene, body, out, dialect)
             return

@@ -34,8 +34,7 @@ from flexmb.scene.schema import Marker, Scene
 from flexmb.view.draw import draw
 from flexmb.view.drawing import CarriedPoint, Line, carried_line, carriers
 from flexmb.view.film import hung, marked
-from flexmb.view.page import THREE, asset, in_script
-from flexmb.view.scene_view import html_file
+from flexmb.view.page import THREE, asset, html_file, in_script
 
 FLAGS = ("-target", "wasm32-wasi", "-mexec-model=reactor", "-std=gnu11", "-O2", "-g0", "-Wl,--strip-all")
 FRAME_S = 1.0 / 240.0  # the longest step: a quarter of a frame of a screen

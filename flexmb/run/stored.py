@@ -13,6 +13,7 @@ from flexmb.output.files import from_text
 from flexmb.run.run_arrays import labels
 from flexmb.scene.functions import ControlSignal
 from flexmb.scene.problems import closest
+from flexmb.scene.reading import REAL, TEXT, Unreadable, unpacked
 from flexmb.scene.schema import Scene
 from flexmb.system.compile import assembled
 from flexmb.tables.state import State
@@ -77,19 +78,21 @@ def _table(columns: Mapping[str, Real], names: Sequence[str], path: Path) -> Rea
 
 
 def _from_csv(path: Path) -> dict[str, Real]:
-    with path.open(newline="", encoding="utf-8") as file:
-        header, *rows = list(csv.reader(file)) or [[]]
     try:
+        with path.open(newline="", encoding="utf-8") as file:
+            header, *rows = list(csv.reader(file)) or [[]]
         values = np.array(rows, dtype=float).reshape(len(rows), len(header))
-    except ValueError:
-        raise ValueError(f"{path}: not every row has a number for every column") from None
+    except (ValueError, csv.Error) as error:
+        raise ValueError(f"{path}: not every row has a number for every column: {error}") from None
     return {UNIT.sub("", from_text(cell)): values[:, i] for i, cell in enumerate(header)}
 
 
 def _from_npz(path: Path) -> dict[str, Real]:
     try:
-        with np.load(path) as stored:
-            names, values = stored["names"], stored["values"]
-    except (KeyError, ValueError) as error:
+        stored = unpacked(path, dict.fromkeys(("names", "units", "scene"), TEXT) | {"values": REAL})
+        names, values = stored["names"], stored["values"]
+    except (KeyError, Unreadable) as error:
         raise ValueError(f"{path}: this is no stored run, but perhaps a restart: {error}") from None
+    if names.ndim != 1 or values.ndim != 2 or len(names) != values.shape[1]:
+        raise ValueError(f"{path}: {names.shape} names for values of the shape {values.shape} are no columns")
     return {str(name): values[:, i] for i, name in enumerate(names)}

@@ -5,11 +5,15 @@ import io
 import json
 import math
 import tomllib
+import zipfile
 from pathlib import Path
 
 import msgspec
 import numpy as np
 
+from crosscheck.engines.fmu.archive import read_archive
+from crosscheck.engines.fmu.bad import BadFmu
+from crosscheck.engines.fmu.mapping import read_mapping
 from crosscheck.library.case import CaseError
 from crosscheck.library.expect_file import NAME, read_expect_file
 from crosscheck.library.find import load_case
@@ -18,11 +22,13 @@ from crosscheck.mutation.campaign import SCORES
 from crosscheck.report.mutations import read_scores
 from crosscheck.sealed.compare import compare_results
 from crosscheck.sealed.seal import ResultsError, read_finished, sealed_text
+from flexmb.run.stored import stored_columns
 from flexmb.scene.bodies import BeamBody
 from flexmb.scene.files import dumps, load_scene
 from flexmb.scene.problems import SceneError
 from flexmb.scene.rest_curve import is_curved, rest_sections
 from flexmb.sensitivity.measurements import measurements
+from tests.crosscheck.engines.fmu.foreign import MAPPING
 from tests.crosscheck.sealed.test_compare import made
 from tests.crosscheck.sessions import CASE
 from tests.flexmb.scene.test_sections import K, M, scene, station
@@ -31,6 +37,7 @@ from tests.fuzz.kind import Accept, Kind
 
 CASES = Path(__file__).resolve().parents[2] / "cases"
 MEASURED = b"t [s],tip.position.x [m],angle [rad],'=sum [1]\n0,0.5,0.1,1\n0.25,,0.2,2\n0.5,0.45,nan,3\n1,4e-1,0.3,-4\n"
+STORED = b"t [s],pivot.rotation [rad],energy.total [J]\n0,0.5,1\n0.1,0.4,1.0\n0.2,-1e-3,nan\n"
 EXPECTED = """[[goal]]
 engine = "stepper"
 cases = ["*"]
@@ -66,6 +73,10 @@ def of_tables(read_scene: Accept) -> dict[str, Kind]:
     sections = (dumps(scene(station(0.0, K, M))).encode(),)
     beam = lambda path: read_scene(path) or _rest(path)  # noqa: E731
     return {
+        "stored run": Kind("trajectory.csv", (STORED,), table, (ValueError,), _stored),
+        "stored arrays": Kind("trajectory.npz", (_arrays(),), mutate.BYTES, (ValueError,), _stored),
+        "mapping of an FMU": Kind("swing.toml", (MAPPING.encode(),), mutate.TOML, (BadFmu,), _mapping),
+        "FMU": Kind("swing.fmu", (_fmu(),), mutate.BYTES, (BadFmu,), _archive),
         "measurements": Kind("ring.csv", (MEASURED,), table, (ValueError,), _measured),
         "expectations": Kind(NAME, (EXPECTED.encode(),), mutate.TOML, (CaseError,), _expected),
         "baseline": Kind("baseline.json", (sealed_text(made()).encode(),), sealed, (ResultsError,), _baseline),
@@ -74,6 +85,40 @@ def of_tables(read_scene: Accept) -> dict[str, Kind]:
         "section matrices": Kind("scene.toml", sections, numbers, (SceneError,), beam, 'scene "'),
         "couplings": Kind("scene.toml", coupled, numbers, (SceneError,), read_scene, 'scene "'),
     }
+
+
+def _arrays() -> bytes:
+    memory = io.BytesIO()
+    values = np.array([[0.0, 0.5], [0.1, 0.4]])
+    np.savez(memory, names=np.array(["t", "pivot.rotation"]), units=np.array(["s", "rad"]), scene="p", values=values)
+    return memory.getvalue()
+
+
+def _fmu() -> bytes:
+    memory = io.BytesIO()
+    with zipfile.ZipFile(memory, "w") as archive:
+        archive.writestr("modelDescription.xml", '<fmiModelDescription fmiVersion="2.0" modelName="swing"/>')
+    return memory.getvalue()
+
+
+def _stored(path: Path) -> str | None:
+    columns = stored_columns(path)
+    lengths = {column.shape for column in columns.values()}
+    return None if len(lengths) == 1 and "t" in columns else f"columns are of {lengths}"
+
+
+def _mapping(path: Path) -> str | None:
+    content = json.loads(msgspec.json.encode(read_mapping(path)))
+    said = tomllib.loads(path.read_text(encoding="utf-8"))
+    return None if said.keys() <= content.keys() else "a key was dropped"
+
+
+def _archive(path: Path) -> str | None:
+    try:
+        read_archive(path)
+    except ModuleNotFoundError:  # of FMPy, which reads what the file describes
+        return None
+    return "an FMU without an interface was taken"
 
 
 def _measured(path: Path) -> str | None:

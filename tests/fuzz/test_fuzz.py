@@ -159,6 +159,8 @@ NOT_OF_USERS = {
     "crosscheck/stability/map_records.py:identity": "a digest",
     "flexmb/control/user.py": "sources of users' functions, which are run anyhow",
     "flexmb/export/sources.py:_shared": "files of the package",
+    "flexmb/export/web.py:wasm": "what the compiler has just written",
+    "crosscheck/engines/fmu/engine.py:_mapping_digest": "a digest",
     "flexmb/export/writing.py:_library": "what the compiler has just written",
     "flexmb/jit/": "kernels and their sources", "flexmb/output/readers.py:write": "writes",
     "flexmb/output/files.py:_settle": "writes",

@@ -31,6 +31,7 @@ from tests.crosscheck.sessions import CASE, copy_case
 # Loaded in a run of an engine, yet without a part in its numbers.
 WITHOUT_PART = {
     "crosscheck.engines.registry": "finds engines and loads them",
+    "crosscheck.engines.unusable": "says why an engine cannot be used at all",
     "crosscheck.engines.pinocchio": "another engine, which the registry can load",
     "crosscheck.engines.mujoco": "another engine", "crosscheck.engines.exudyn": "another engine",
     "crosscheck.library": "reads cases and makes scenes, as plan",

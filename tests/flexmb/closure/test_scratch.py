@@ -40,6 +40,7 @@ WRITERS = {
 OF_DUALS = {
     "closure/tangent.py": {"change_by_time", "evaluate_held", "_hold_rows"},
     "sensitivity/chain.py": {"under_loads"},
+    "export/entry.py": {"chain_outputs_along"},
 }
 # What belongs to whoever fills it until the next pass of a kernel, which does not read it.
 SCRATCH = {"scratch", "solution", "shared", "coefficient", "step"}
@@ -86,7 +87,8 @@ def test_only_these_write_the_loads_that_act() -> None:
 
 def written() -> list[Any]:
     """What calls write, of all workspaces of closures and trees that there are."""
-    spaces = [each for each in gc.get_objects() if isinstance(each, ClosureWorkspace | Workspace)]
+    # By their types alone: `isinstance` asks a weak proxy, of which compilers leave some, for what is no longer there.
+    spaces = [each for each in gc.get_objects() if issubclass(type(each), ClosureWorkspace | Workspace)]
     of_trees = {each.name for each in fields(Workspace)} - LASTS_IN_TREES
     return [
         getattr(each, name) for each in spaces

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from msgspec.structs import replace
 
 import flexmb as fm
 from flexmb.scene import schema as s
@@ -90,13 +91,18 @@ def to_ground(builder: SceneBuilder) -> SceneBuilder:
 
 def everything(level: s.Level = "full") -> s.Scene:
     """All of it, on the ground."""
-    return to_ground(losses(between_bodies(bodies(grounded=True, level=level)))).scene()
+    return waived(to_ground(losses(between_bodies(bodies(grounded=True, level=level)))).scene())
 
 
 def free_flying(*, lossy: bool = False) -> s.Scene:
     """Connectors among the bodies only."""
     builder = between_bodies(bodies(grounded=False))
-    return (losses(builder) if lossy else builder).scene()
+    return waived((losses(builder) if lossy else builder).scene())
+
+
+def waived(scene: s.Scene) -> s.Scene:
+    """The scene, whose boom has no mode of torsion for what its connectors carry: that is not what it is for."""
+    return replace(scene, allow=("few_modes",))
 
 
 def started(scene: s.Scene) -> tuple[fm.System, fm.State]:

@@ -119,7 +119,8 @@ def pair(kind: str | None, *events: fm.SceneEvent, is_closed: bool = False) -> f
         scene.closure("port", kind, "arm a", "arm b", node_a="tip", node_b="tip", quaternion_b=turned, closed=is_closed)
         scene.sense_load("felt", "port")
         scene.total_load("all", ["port"], "arm b").event("never", "felt[0]", 1e9, fm.EndRun())  # so that it is a signal
-    return scene.add(*events).scene()
+    # Arms without torsion, whatever a joint carries: that is not what it is for.
+    return msgspec.structs.replace(scene.add(*events).scene(), allow=("few_modes",))
 
 
 def approaching(scene: fm.Scene, t: float) -> fm.State:

@@ -20,7 +20,7 @@ from tests.flexmb.system import public_calls
 INSIDE = {  # of the mechanics, for numbers that have been examined
     "nested_system", "precision_if_doubtful", "observe_recursion", "observe_rates", "observe_motion", "observe_row",
     "check_status", "check_precision", "all_loads", "referred_loads", "with_numbers", "fault_name", "turns",
-    "refuse_corners", "inverse_at", "by_hinge", "in_axes",
+    "refuse_corners", "refuse_undecided", "inverse_at", "by_hinge", "along_hinges", "in_axes",
 }  # fmt: skip
 UNTRIED = {  # what users may ask all the same: docs/threads.md
     **{f"System.{name}": "makes a new workspace, which is for one thread"
@@ -36,6 +36,7 @@ UNTRIED = {  # what users may ask all the same: docs/threads.md
 EXEMPT = {
     *UNTRIED,
     *(f"System.{name}" for name in INSIDE),
+    "Names.along_hinges",  # of outputs that were found
     "Parameters.arranged",  # of derivatives of runs
     "Batch.tables", "Batch.constants",  # of those who fill lanes
     "open_loop", "user_function", "no_user_code",  # a scene; a function; nothing
