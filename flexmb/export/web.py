@@ -11,11 +11,9 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
-from html import escape
 from importlib.util import find_spec
 from math import inf, isfinite
 from pathlib import Path
-from string import Template
 from typing import Any
 
 import msgspec
@@ -34,7 +32,7 @@ from flexmb.scene.schema import Marker, Scene
 from flexmb.view.draw import draw
 from flexmb.view.drawing import CarriedPoint, Line, carried_line, carriers
 from flexmb.view.film import hung, marked
-from flexmb.view.page import THREE, asset, html_file, in_script
+from flexmb.view.page import SCRIPTS, filled, html_file
 
 FLAGS = ("-target", "wasm32-wasi", "-mexec-model=reactor", "-std=gnu11", "-O2", "-g0", "-Wl,--strip-all")
 FRAME_S = 1.0 / 240.0  # the longest step: a quarter of a frame of a screen
@@ -170,7 +168,8 @@ def _page(scene: Scene, filmed: Scene, model: ExportedModel, sliders: list[tuple
     number = {name: i for i, name in enumerate(carrying)}
     states = {each.name: i for i, each in enumerate(model.states)}
     data: dict[str, Any] = {
-        "title": printable(scene.name), "digest": model.digest, "step": step, "span": SPAN_S,
+        "digest": model.digest, "step": step, "span": SPAN_S,
+        "notes": [f"No arrows: {model.open_loads}."] if model.open_loads else [],
         "states": len(model.states), "outputs": len(model.outputs), "gravity": filmed.gravity_m_s2,
         "wasm": base64.b64encode(wasm(model)).decode(),
         "markers": [
@@ -202,7 +201,4 @@ def _page(scene: Scene, filmed: Scene, model: ExportedModel, sliders: list[tuple
         ],
         "readings": [{"name": name, "unit": "J", "output": outputs[name]} for name in READINGS],
     }  # fmt: skip
-    scripts = "\n".join(f"<script>\n{asset(name)}\n</script>" for name in (THREE, "unpack.js", "scene.js", "live.js"))
-    return Template(asset("live.html")).substitute(
-        title=escape(printable(scene.name)), style=asset("scene.css"), scripts=scripts, data=in_script(data)
-    )
+    return filled("view.html", scene.name, (*SCRIPTS, "live.js"), data)

@@ -55,14 +55,14 @@ class LiveView extends SceneView {
       }
     } catch { /* what was reached is enough to look at, and the reader will see where it ends */ }
     super(host, [{
-      title: "", times: 0, lines: data.lines, trails: data.trails, gravity: data.gravity,
+      title: "", times: 0, lines: data.lines, trails: data.trails, gravity: data.gravity, notes: data.notes,
       markers: data.markers.map(({ name }, i) => ({ name, position: 1 + 2 * i, orientation: 2 + 2 * i })),
       wheels: data.wheels.map((wheel, i) => ({ ...wheel, angle: 1 + 2 * markers + i })),
       arrows: data.arrows.map((arrow, i) => ({ ...arrow, values: 1 + 2 * markers + wheels + i })),
     }], columns, data.title);
     this.model = model; this.data = data; this.flat = flat; this.pace = 1;
     this.slider.hidden = true; this.phase = 1;
-    host.querySelector(".hint").textContent = "Computed here, as you look. Select the picture to turn it (drag, or shift and arrows) and to zoom (wheel, or + and -); space stops and goes on.";
+    host.querySelector(".hint:not(.notes)").textContent = "Computed here, as you look. Select the picture to turn it (drag, or shift and arrows) and to zoom (wheel, or + and -); space stops and goes on, arrows look back.";
     this.offer(host);
     this.restart();
   }
@@ -114,7 +114,8 @@ class LiveView extends SceneView {
       let j = 0;
       for (const value of this.model.values()) { const column = this.flat[j++]; column.copyWithin(0, 1); column[column.length - 1] = value; }
     }
-    this.last = now; this.draw(); requestAnimationFrame(t => this.tick(t));
+    this.last = now; this.phase = 1; // the present frame is the last; before it stands what has passed
+    this.draw(); requestAnimationFrame(t => this.tick(t));
   }
 
   draw() {
@@ -123,4 +124,9 @@ class LiveView extends SceneView {
     const readings = this.data.readings.map(({ name, unit, output }) => `${name} ${this.model.output[output].toPrecision(6)} ${unit}`);
     this.read.textContent = [...readings, `steps of ${this.data.step.toPrecision(2)} s`, ...(this.pace < 0.97 ? [`${Math.round(100 * this.pace)} % of real time`] : [])].join(" · ");
   }
+}
+
+async function computed(host, data) {
+  const { instance } = await WebAssembly.instantiate(Uint8Array.from(atob(data.wasm), c => c.charCodeAt(0)), {});
+  return new LiveView(host, new Model(instance, data), data);
 }

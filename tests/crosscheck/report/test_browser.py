@@ -39,6 +39,7 @@ FOCUSED = """
 const e = document.activeElement;
 return [e.tagName, e.tagName === "SUMMARY" && !e.parentElement.open, e === document.body];
 """
+PAGES = Path(__file__).parents[3] / "docs" / "_static"
 VIEW = "document.querySelector('.animation').view"
 DISTANCE = f"return {VIEW}.camera.position.distanceTo({VIEW}.controls.target)"
 MIDDLE = """
@@ -387,6 +388,28 @@ def test_a_view_of_a_run_moves_and_shows_its_loads(reader: Reader, tmp_path: Pat
     assert np.count_nonzero(np.any(np.abs(without - moved) > 0.1, axis=2)) > 50  # pixels of the arrows, which are gone
     reader.run("document.querySelector('.animation').view.draw()")
     assert np.array_equal(reader.picture(".animation canvas"), without)
+    assert reader.run("return performance.getEntriesByType('resource').length") == 0
+    assert reader.errors() == []
+
+
+@pytest.mark.parametrize("size", [WIDE, NARROW])
+def test_a_page_that_computes_moves_and_takes_numbers(reader: Reader, size: tuple[int, int]) -> None:
+    """That of the site, which `flexmb export --page` has made: it runs by itself, from a slider on otherwise."""
+    reader.open(PAGES / "yoke_array.html", size, calm=False)
+    reader.wait(f"return {VIEW}?.model.time > 0.3")
+    assert reader.run(f"return {VIEW}.playing && {VIEW}.said.textContent === ''")
+    assert len(hues(reader.picture(".animation canvas"))) >= 2
+    # From the start to the same time, with the number of the scene and with another one: other angles.
+    script = f"""
+        const v = {VIEW}, slider = document.querySelectorAll(".numbers input")[arguments[0]];
+        v.play(false); slider.value = arguments[1]; slider.oninput(); v.restart(); v.model.advance(0.5);
+        return Array.from(v.model.state);
+    """
+    first, other, again = (np.array(reader.run(script, 0, value)) for value in (2.0, 4.0, 2.0))
+    assert np.all(np.isfinite(first)) and np.array_equal(first, again)
+    assert np.max(np.abs(first - other)) > 1e-3
+    assert "Computed here" in reader.run("return document.querySelector('.hint:not(.notes)').textContent")
+    assert reader.run("return document.documentElement.scrollWidth") <= size[0]
     assert reader.run("return performance.getEntriesByType('resource').length") == 0
     assert reader.errors() == []
 

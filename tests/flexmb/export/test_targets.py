@@ -26,6 +26,7 @@ from flexmb.export.refusals import NotExportable
 from flexmb.scene.files import dumps
 from flexmb.scene.shapes import beam_section
 from flexmb.typing import Real
+from flexmb.view.page import SCRIPTS, asset
 from tests.repo.project import ROOT
 
 pytestmark = pytest.mark.skipif(
@@ -181,6 +182,7 @@ def test_the_demonstration_of_the_site_is_of_the_present_scene() -> None:
     scene = web._filmed(fm.load_scene(ROOT / "cases" / "spacecraft" / "yoke_array" / "scene.toml"))
     digest = sha256(dumps(scene).encode()).hexdigest()
     assert f'"digest":"{digest}"' in text and len(text) < 1_000_000
+    assert all(asset(name) in text for name in ("live.js", *SCRIPTS)), "draw it anew: its scripts have changed"
 
 
 def _file(folder: Path) -> Path:
