@@ -32,6 +32,7 @@ function fitted(text, width) {
 
 // Names at the ends of lines, none over another: annotations for ends { x, y, text, colour } in powers of ten, on axes of
 // `ranges` [[x0, x1], [y0, y1]] that are drawn on `size` [width, height] pixels.
+// Texts are of the colour of texts, since those of curves stand out too little on one of the two grounds; leaders have these.
 const LABEL = 13; // pixels between two names
 function endLabels(ends, [[x0, x1], [y0, y1]], [width, height]) {
   const placed = [];
@@ -45,7 +46,7 @@ function endLabels(ends, [[x0, x1], [y0, y1]], [width, height]) {
     placed.push({ from, to: from + end.wide, at });
     placed.sort((a, b) => a.at - b.at);
     end.note = { xref: "x", yref: "y", x: end.x, y: end.y, ax: left ? -10 : 10, ay: at - end.py, xanchor: left ? "right" : "left", showarrow: true, arrowhead: 0,
-      arrowwidth: 0.6, arrowcolor: end.colour, text: `<b>${end.text}</b>`, font: { size: 11, color: end.colour }, bgcolor: tone("page"), borderpad: 0 };
+      arrowwidth: 0.6, arrowcolor: end.colour, text: `<b>${end.text}</b>`, font: { size: 11, color: tone("ink") }, bgcolor: tone("page"), borderpad: 0 };
   }
   return seen.map(end => end.note);
 }
